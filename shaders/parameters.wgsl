@@ -1,0 +1,19 @@
+// What a dispatch draws; src/sampler.rs writes it.
+struct Parameters {
+    key: vec2<u32>,
+    first: vec2<u32>,
+    count: u32,
+    // The stream's number, shifted to where the counter has it.
+    stream: u32,
+    max_attempts: u32,
+}
+
+@group(0) @binding(0) var<uniform> parameters: Parameters;
+
+// Draw i of the range.
+fn draw_at(i: u32) -> Draw {
+    let low = parameters.first.x + i;
+    let carry = select(0u, 1u, low < i);
+    let index = vec2(low, parameters.first.y + carry);
+    return draw(parameters.key, index, parameters.stream, parameters.max_attempts);
+}

@@ -1,0 +1,80 @@
+//! CIE 1931 colorimetry on a grid: the only home of the colour matching functions, of D65, and of the weights that
+//! turn a reflectance into its luminous reflectance value (LRV).
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::dataset::Builtin;
+use crate::grid::{Extend, Grid, Spline};
+
+/// The CIE standard illuminant D65 on a grid (relative power, 100 at 560 nm); zero outside 380 to 780 nm.
+pub fn d65(grid: Grid) -> Vec<f64> {
+    on_grid(Builtin::D65, 0, grid)
+}
+
+/// The CIE 1931 colour matching functions x, y and z on a grid; zero outside 360 to 830 nm.
+pub fn cmf(grid: Grid) -> [Vec<f64>; 3] {
+    [0, 1, 2].map(|function| on_grid(Builtin::Xyz1931, function, grid))
+}
+
+fn on_grid(table: Builtin, spectrum: usize, grid: Grid) -> Vec<f64> {
+    let table = table.table();
+    let spline = Spline::new(table.wavelengths(), table.spectrum(spectrum));
+    grid.wavelengths().map(|w| spline.at(w, Extend::Zero)).collect()
+}
+
+/// The weights of X, Y and Z for reflectances under D65: tristimulus values are their products with a reflectance,
+/// and a perfect white has Y = 1. `None` where the grid has no light that the eye sees.
+pub fn xyz_weights(grid: Grid) -> Option<[Vec<f64>; 3]> {
+    let light = d65(grid);
+    let cmf = cmf(grid);
+    let white: f64 = light.iter().zip(&cmf[1]).map(|(e, y)| e * y).sum();
+    (white > 0.0).then(|| cmf.map(|f| light.iter().zip(&f).map(|(e, f)| e * f / white).collect()))
+}
+
+/// The weights of the luminous reflectance value, LRV(r) = sum r D65 y / sum D65 y: they sum to 1, so a perfect
+/// white has LRV 1. `None` where the grid has no light that the eye sees.
+pub fn lrv_weights(grid: Grid) -> Option<Vec<f64>> {
+    xyz_weights(grid).map(|[_, y, _]| y)
+}
+
+/// Linear Rec. 709 components of XYZ relative to D65 white (IEC 61966-2-1), unclamped.
+pub fn linear_srgb(xyz: [f64; 3]) -> [f64; 3] {
+    #[rustfmt::skip]
+    let matrix = Matrix3::new(
+         3.2406255, -1.537208,  -0.4986286,
+        -0.9689307,  1.8757561,  0.0415175,
+         0.0557101, -0.2040211,  1.0569959,
+    );
+    (matrix * Vector3::from(xyz)).into()
+}
+
+/// 8-bit sRGB of linear components (IEC 61966-2-1), which are clamped to 0..1.
+pub fn encode_srgb(linear: [f64; 3]) -> [u8; 3] {
+    linear.map(|v| {
+        let v = v.clamp(0.0, 1.0);
+        let encoded = if v <= 0.0031308 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        (encoded * 255.0).round() as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_perfect_white_has_lrv_1_and_the_chromaticity_of_d65() {
+        for grid in ["400:10:700", "400:5:700", "380:1:780"] {
+            let grid = grid.parse().unwrap();
+            let [x, y, z] = xyz_weights(grid).unwrap().map(|w| w.iter().sum::<f64>());
+            assert!((y - 1.0).abs() < 1e-14);
+            let (cx, cy) = (x / (x + y + z), y / (x + y + z));
+            assert!((cx - 0.3127).abs() < 5e-4 && (cy - 0.3290).abs() < 5e-4, "{grid}: {cx} {cy}");
+            assert_eq!(encode_srgb(linear_srgb([0.9505, 1.0, 1.089])), [255; 3]);
+        }
+    }
+
+    #[test]
+    fn a_grid_in_the_infrared_has_no_luminance() {
+        assert_eq!(lrv_weights("900:10:1000".parse().unwrap()), None);
+    }
+}

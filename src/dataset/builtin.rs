@@ -1,0 +1,97 @@
+//! The tables that are compiled in: unmodified files of the Psychophysics Toolbox, see `data/README.md`.
+
+use std::path::Path;
+
+use super::{Table, mat};
+
+/// A table that is compiled in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Builtin {
+    /// 462 Munsell papers measured by Nickerson: reflectance, 400 to 700 nm by 5 nm.
+    Munsell,
+    /// 170 natural and man-made surfaces measured by Vrhel, Gershon & Iwan (1994): reflectance, 390 to 730 nm by 2 nm.
+    Vrhel,
+    /// CIE standard illuminant D65: relative power, 380 to 780 nm by 5 nm.
+    D65,
+    /// CIE 1931 colour matching functions x, y, z: 360 to 830 nm by 1 nm.
+    Xyz1931,
+    /// CIE daylight basis: the mean and two components of Judd, MacAdam & Wyszecki (1964), 380 to 780 nm by 5 nm.
+    CieDaylight,
+}
+
+impl Builtin {
+    /// The table of that name: `munsell`, `vrhel`, `d65`, `xyz1931` or `cie-daylight`.
+    pub fn named(name: &str) -> Option<Builtin> {
+        Some(match name {
+            "munsell" => Builtin::Munsell,
+            "vrhel" => Builtin::Vrhel,
+            "d65" => Builtin::D65,
+            "xyz1931" => Builtin::Xyz1931,
+            "cie-daylight" => Builtin::CieDaylight,
+            _ => return None,
+        })
+    }
+
+    /// The table itself, at its native sampling.
+    pub fn table(self) -> Table {
+        let (name, bytes): (_, &[u8]) = match self {
+            Builtin::Munsell => ("sur_nickerson", include_bytes!("../../data/sur_nickerson.mat")),
+            Builtin::Vrhel => ("sur_vrhel", include_bytes!("../../data/sur_vrhel.mat")),
+            Builtin::D65 => ("spd_D65", include_bytes!("../../data/spd_D65.mat")),
+            Builtin::Xyz1931 => ("T_xyz1931", include_bytes!("../../data/T_xyz1931.mat")),
+            Builtin::CieDaylight => ("B_cieday", include_bytes!("../../data/B_cieday.mat")),
+        };
+        let mut table =
+            mat::read(Path::new(name), bytes, Some(name)).expect("compiled-in tables are readable");
+        table.name = name.to_owned();
+        if self == Builtin::Munsell {
+            // The file runs from 380 to 780 nm, but was padded with zeros where nothing was measured.
+            table.crop(400.0, 700.0);
+        }
+        table
+    }
+}
+
+impl Table {
+    fn crop(&mut self, first: f64, last: f64) {
+        let start = self.wavelengths.partition_point(|&w| w < first);
+        let end = self.wavelengths.partition_point(|&w| w <= last);
+        self.wavelengths = self.wavelengths[start..end].to_vec();
+        self.spectra = self.spectra.rows(start, end - start).into_owned();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Kind;
+
+    #[test]
+    fn every_table_has_its_shape_range_and_kind() {
+        for (name, count, first, last, bands, kind) in [
+            ("munsell", 462, 400.0, 700.0, 61, Some(Kind::Reflectance)),
+            ("vrhel", 170, 390.0, 730.0, 171, Some(Kind::Reflectance)),
+            ("d65", 1, 380.0, 780.0, 81, Some(Kind::Illuminant)),
+            ("xyz1931", 3, 360.0, 830.0, 471, None),
+            ("cie-daylight", 3, 380.0, 780.0, 81, None),
+        ] {
+            let table = Builtin::named(name).unwrap().table();
+            let wavelengths = table.wavelengths();
+            assert_eq!((table.len(), wavelengths.len(), table.kind()), (count, bands, kind), "{name}");
+            assert_eq!((wavelengths[0], wavelengths[bands - 1]), (first, last), "{name}");
+        }
+    }
+
+    /// Values that stand in the published tables.
+    #[test]
+    fn known_values() {
+        let at = |b: Builtin, spectrum: usize, nm: f64| {
+            let table = b.table();
+            let band = table.wavelengths().iter().position(|&w| w == nm).unwrap();
+            table.spectrum(spectrum)[band]
+        };
+        assert_eq!(at(Builtin::D65, 0, 560.0), 100.0);
+        assert_eq!(at(Builtin::Xyz1931, 1, 555.0), 1.0);
+        assert_eq!(at(Builtin::CieDaylight, 0, 560.0), 100.0);
+    }
+}

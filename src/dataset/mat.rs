@@ -1,0 +1,198 @@
+//! MATLAB v5 files by the field's convention: a matrix of spectra, and its sampling `S_x` = [start step count] (nm)
+//! beside it, as in `sur_vrhel` with `S_vrhel`.
+//!
+//! The `matfile` crate decodes numeric arrays. This module walks the file's elements first, for three things which
+//! that crate leaves to its caller: unpacking is capped, what is not a numeric array (structs, cells, objects) is
+//! stepped over rather than failing the file, and dimensions are checked against the bytes that are there.
+
+use std::io::Read;
+use std::path::Path;
+
+use matfile::{MatFile, NumericData};
+use nalgebra::DMatrix;
+
+use super::{DatasetError, Kind, MAX_BYTES, Table};
+use crate::grid::Grid;
+
+const HEADER: usize = 128;
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+
+/// A two-dimensional real array, column by column.
+struct Matrix {
+    name: String,
+    rows: usize,
+    columns: usize,
+    values: Vec<f64>,
+}
+
+pub(super) fn read(path: &Path, bytes: &[u8], variable: Option<&str>) -> Result<Table, DatasetError> {
+    let matrices = matrices(path, bytes)?;
+    let samplings: Vec<_> = matrices.iter().filter_map(sampling).collect();
+    let spectra: Vec<_> = matrices
+        .iter()
+        .filter_map(|m| Some((m, grid_of(m, &samplings)?)))
+        .filter(|(m, _)| variable.is_none_or(|v| v == m.name))
+        .collect();
+    let found = || match matrices.as_slice() {
+        [] => "no numeric matrix".to_owned(),
+        all => all
+            .iter()
+            .map(|m| format!("{} ({} x {})", m.name, m.rows, m.columns))
+            .collect::<Vec<_>>()
+            .join(", "),
+    };
+    let path = path.to_owned();
+    match (spectra.as_slice(), variable) {
+        ([(matrix, grid)], _) => table(&format!("{path:?}:{}", matrix.name), matrix, *grid),
+        ([], None) => Err(DatasetError::NoMatrix { path, found: found() }),
+        ([], Some(v)) => Err(DatasetError::NoVariable { path, variable: v.to_owned(), found: found() }),
+        (several, _) => {
+            let candidates = several.iter().map(|(m, _)| m.name.clone()).collect();
+            Err(DatasetError::Ambiguous { path, candidates })
+        }
+    }
+}
+
+fn table(name: &str, matrix: &Matrix, grid: Grid) -> Result<Table, DatasetError> {
+    // Spectra stand in columns, but the convention for functions to integrate with (`T_`) is rows.
+    let in_rows =
+        matrix.rows != grid.len() || (matrix.name.starts_with("T_") && matrix.columns == grid.len());
+    let values = &matrix.values;
+    let spectra = match in_rows {
+        true => DMatrix::from_column_slice(matrix.rows, matrix.columns, values).transpose(),
+        false => DMatrix::from_column_slice(matrix.rows, matrix.columns, values),
+    };
+    let mut table = Table::from_columns(name, grid.wavelengths().collect(), spectra)?;
+    table.kind = match matrix.name.to_ascii_lowercase() {
+        n if n.starts_with("sur_") => Some(Kind::Reflectance),
+        n if n.starts_with("spd_") || n.starts_with("daylight") => Some(Kind::Illuminant),
+        _ => None,
+    };
+    Ok(table)
+}
+
+/// The suffix and grid of a variable `S_suffix` = [start step count].
+fn sampling(matrix: &Matrix) -> Option<(String, Grid)> {
+    let suffix = matrix.name.strip_prefix("S_")?.to_ascii_lowercase();
+    let &[start, step, count] = matrix.values.as_slice() else { return None };
+    (count.fract() == 0.0).then(|| Grid::new(start, step, count as usize).ok())?.map(|grid| (suffix, grid))
+}
+
+/// The sampling that belongs to a matrix: the one whose suffix ends the matrix's name, else the only one in the file;
+/// and one of the matrix's sides must be as long as it says.
+fn grid_of(matrix: &Matrix, samplings: &[(String, Grid)]) -> Option<Grid> {
+    if matrix.name.starts_with("S_") {
+        return None;
+    }
+    let name = matrix.name.to_ascii_lowercase();
+    let named = samplings.iter().filter(|(suffix, _)| name.ends_with(suffix)).max_by_key(|(s, _)| s.len());
+    let (_, grid) = named.or(match samplings {
+        [only] => Some(only),
+        _ => None,
+    })?;
+    (grid.len() == matrix.rows || grid.len() == matrix.columns).then_some(*grid)
+}
+
+/// Every real numeric matrix of the file, in order.
+fn matrices(path: &Path, bytes: &[u8]) -> Result<Vec<Matrix>, DatasetError> {
+    let failed = |reason: &str| DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() };
+    let little_endian = endianness(bytes).map_err(failed)?;
+    let word = |at: &[u8], i: usize| -> Option<u32> {
+        let word = at.get(4 * i..4 * i + 4)?.try_into().ok()?;
+        Some(if little_endian { u32::from_le_bytes(word) } else { u32::from_be_bytes(word) })
+    };
+
+    let mut matrices = Vec::new();
+    let mut unpacked = 0;
+    let mut rest = &bytes[HEADER..];
+    while rest.len() >= 8 {
+        let (kind, size) = (word(rest, 0).unwrap_or(0), word(rest, 1).unwrap_or(0) as usize);
+        let Some(payload) = rest.get(8..8 + size) else {
+            return Err(failed("it ends in the middle of a variable; copy it again"));
+        };
+        let inflated;
+        let element = match kind {
+            COMPRESSED => {
+                inflated = inflate(payload, MAX_BYTES - unpacked)
+                    .map_err(|e| failed(&format!("a compressed variable is damaged ({e})")))?
+                    .ok_or_else(|| DatasetError::TooLarge { path: path.to_owned() })?;
+                unpacked += inflated.len() as u64;
+                inflated.as_slice()
+            }
+            _ => &rest[..8 + size],
+        };
+        if is_numeric_matrix(element, word) {
+            matrices.extend(decode(&bytes[..HEADER], element));
+        }
+        rest = &rest[8 + size..];
+        if kind != COMPRESSED {
+            rest = &rest[(size.next_multiple_of(8) - size).min(rest.len())..];
+        }
+    }
+    Ok(matrices)
+}
+
+/// Whether the file is little-endian; an error says what else it is.
+fn endianness(bytes: &[u8]) -> Result<bool, &'static str> {
+    const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+    const V7_3: &str =
+        "it is of version 7.3 (HDF5), which is not supported yet: resave it with save(file, '-v7')";
+    const V4: &str = "it is of version 4, which is not supported: resave it with save(file, '-v7')";
+    if bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(HDF5) || bytes.get(512..520) == Some(HDF5) {
+        return Err(V7_3);
+    }
+    match bytes.get(126..HEADER) {
+        Some(b"IM") => return Ok(true),
+        Some(b"MI") => return Ok(false),
+        _ => {}
+    }
+    // A version 4 file starts with a small number, its type word, in either byte order.
+    match bytes.first_chunk() {
+        Some(&word) if u32::from_le_bytes(word).min(u32::from_be_bytes(word)) < 5000 => Err(V4),
+        _ => Err("it has no MATLAB header"),
+    }
+}
+
+/// At most `cap` bytes of a zlib stream; `None` where it holds more.
+fn inflate(bytes: &[u8], cap: u64) -> std::io::Result<Option<Vec<u8>>> {
+    let mut out = Vec::new();
+    flate2::read::ZlibDecoder::new(bytes).take(cap + 1).read_to_end(&mut out)?;
+    Ok((out.len() as u64 <= cap).then_some(out))
+}
+
+/// Whether an element is a real, dense, numeric array whose dimensions its bytes can hold.
+fn is_numeric_matrix(element: &[u8], word: impl Fn(&[u8], usize) -> Option<u32>) -> bool {
+    const CLASSES: std::ops::RangeInclusive<u32> = 6..=15; // double, single, and the integers
+    const COMPLEX: u32 = 0x0800;
+    let Some(flags) = word(element, 4) else { return false };
+    let dimensions = || {
+        let count = word(element, 7)? as usize / 4;
+        (8..8 + count.min(8)).try_fold(1u64, |product, i| product.checked_mul(word(element, i)?.into()))
+    };
+    word(element, 0) == Some(MATRIX)
+        && CLASSES.contains(&(flags & 0xFF))
+        && flags & COMPLEX == 0
+        && dimensions().is_some_and(|values| values <= element.len() as u64)
+}
+
+/// The matrix of one element, or nothing where it is not two-dimensional or not readable.
+fn decode(header: &[u8], element: &[u8]) -> Option<Matrix> {
+    let file = MatFile::parse([header, element].concat().as_slice()).ok()?;
+    let [array] = file.arrays().as_slice() else { return None };
+    let &[rows, columns] = array.size().as_slice() else { return None };
+    let values: Vec<f64> = match array.data() {
+        NumericData::Double { real, .. } => real.clone(),
+        NumericData::Single { real, .. } => real.iter().map(|&v| v.into()).collect(),
+        NumericData::Int8 { real, .. } => real.iter().map(|&v| v.into()).collect(),
+        NumericData::UInt8 { real, .. } => real.iter().map(|&v| v.into()).collect(),
+        NumericData::Int16 { real, .. } => real.iter().map(|&v| v.into()).collect(),
+        NumericData::UInt16 { real, .. } => real.iter().map(|&v| v.into()).collect(),
+        NumericData::Int32 { real, .. } => real.iter().map(|&v| v.into()).collect(),
+        NumericData::UInt32 { real, .. } => real.iter().map(|&v| v.into()).collect(),
+        NumericData::Int64 { real, .. } => real.iter().map(|&v| v as f64).collect(),
+        NumericData::UInt64 { real, .. } => real.iter().map(|&v| v as f64).collect(),
+    };
+    let name = array.name().to_owned();
+    (values.len() == rows.checked_mul(columns)?).then_some(Matrix { name, rows, columns, values })
+}

@@ -1,0 +1,244 @@
+//! Measured spectra: tables as they were measured, and the data set that a model is fitted to.
+//!
+//! A [`Table`] is what one file holds, at its own wavelengths. A [`Dataset`] is one or more tables on one grid. Both
+//! are checked when they are made, so nothing downstream meets a NaN or a ragged row.
+
+mod builtin;
+mod csv;
+mod mat;
+
+use std::fmt;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use crate::grid::{self, Extend, Grid, GridError, Spline};
+pub use builtin::Builtin;
+
+/// The most that is read of a file, and that a compressed file may unpack to: 512 MiB, 67 million values.
+const MAX_BYTES: u64 = 512 << 20;
+
+/// What spectra describe, and so what makes one of them physical.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Spectral power distributions of lights: positive in every band, of any magnitude.
+    Illuminant,
+    /// Diffuse reflectances of surfaces: between 0 and 1 in every band.
+    Reflectance,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Kind::Illuminant => "illuminant",
+            Kind::Reflectance => "reflectance",
+        })
+    }
+}
+
+/// Why data cannot be used: what is wrong, where, and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what the fields are
+pub enum DatasetError {
+    #[error("cannot read {path:?}: {source}")]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{path:?} holds more than {} MiB (unpacked): split it, or keep only the spectra", MAX_BYTES >> 20)]
+    TooLarge { path: PathBuf },
+    #[error("{path:?} is empty")]
+    Empty { path: PathBuf },
+    #[error("{path:?}: unknown type of file; expected .mat, .csv, .tsv or .txt")]
+    UnknownType { path: PathBuf },
+    #[error("{path:?} is not a readable MATLAB file: {reason}")]
+    Mat { path: PathBuf, reason: String },
+    #[error("{path:?}, line {line}: {reason}")]
+    Csv { path: PathBuf, line: u64, reason: String },
+    #[error(
+        "{path:?} holds no matrix of spectra with its sampling beside it (X with S_X = [start step count]); it holds {found}"
+    )]
+    NoMatrix { path: PathBuf, found: String },
+    #[error("{path:?} holds several matrices of spectra: say which, as in {}:{}", path.display(), candidates[0])]
+    Ambiguous { path: PathBuf, candidates: Vec<String> },
+    #[error("{path:?} holds no variable {variable:?} with its sampling beside it; it holds {found}")]
+    NoVariable { path: PathBuf, variable: String, found: String },
+    #[error("{name}: {source}")]
+    Wavelengths { name: String, source: GridError },
+    #[error("{name}: {values} values in spectrum {spectrum}, but {wavelengths} wavelengths")]
+    Length { name: String, spectrum: usize, values: usize, wavelengths: usize },
+    #[error(
+        "spectrum {spectrum} of {name}: the value at {wavelength} nm is {value}; every value must be finite"
+    )]
+    NotFinite { name: String, spectrum: usize, wavelength: f64, value: f64 },
+    #[error("{name} holds no spectra")]
+    NoSpectra { name: String },
+    #[error(
+        "{name} was measured from {first} to {last} nm, which does not cover the grid {grid}: choose a grid within it, or pass --extend hold|zero"
+    )]
+    Range { name: String, first: f64, last: f64, grid: Grid },
+}
+
+/// Spectra of one source, as measured: increasing wavelengths (nm), finite values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    name: String,
+    wavelengths: Vec<f64>,
+    /// A column a spectrum.
+    spectra: DMatrix<f64>,
+    kind: Option<Kind>,
+}
+
+impl Table {
+    /// Spectra given as values, each as long as `wavelengths` (nm). `name` is what messages call them.
+    pub fn new(name: &str, wavelengths: Vec<f64>, spectra: &[Vec<f64>]) -> Result<Table, DatasetError> {
+        if let Some(i) = spectra.iter().position(|s| s.len() != wavelengths.len()) {
+            return Err(DatasetError::Length {
+                name: name.to_owned(),
+                spectrum: i + 1,
+                values: spectra[i].len(),
+                wavelengths: wavelengths.len(),
+            });
+        }
+        let values = spectra.iter().flatten().copied();
+        let spectra = DMatrix::from_iterator(wavelengths.len(), spectra.len(), values);
+        Table::from_columns(name, wavelengths, spectra)
+    }
+
+    /// The readers' way in: `spectra` has a row for each wavelength.
+    fn from_columns(name: &str, wavelengths: Vec<f64>, spectra: DMatrix<f64>) -> Result<Table, DatasetError> {
+        let name = name.to_owned();
+        if spectra.is_empty() {
+            return Err(DatasetError::NoSpectra { name });
+        }
+        if let Err(source) = grid::check_increasing(&wavelengths) {
+            return Err(DatasetError::Wavelengths { name, source });
+        }
+        for (j, spectrum) in spectra.column_iter().enumerate() {
+            if let Some(i) = spectrum.iter().position(|v| !v.is_finite()) {
+                return Err(DatasetError::NotFinite {
+                    name,
+                    spectrum: j + 1,
+                    wavelength: wavelengths[i],
+                    value: spectrum[i],
+                });
+            }
+        }
+        Ok(Table { name, wavelengths, spectra, kind: None })
+    }
+
+    /// Reads a MATLAB v5 `.mat` file, or a `.csv`, `.tsv` or `.txt` file with the wavelengths in the first column and
+    /// a spectrum in each other one. `variable` picks a matrix where a `.mat` file holds several.
+    pub fn open(path: &Path, variable: Option<&str>) -> Result<Table, DatasetError> {
+        let bytes = read_capped(path)?;
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        match extension.as_str() {
+            "mat" => mat::read(path, &bytes, variable),
+            "csv" | "tsv" | "txt" => csv::read(path, &bytes),
+            _ => Err(DatasetError::UnknownType { path: path.to_owned() }),
+        }
+    }
+
+    /// What messages and models call the table.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the field's naming convention says the spectra are: `sur_x` reflectances, `spd_x` and `daylightX`
+    /// illuminants.
+    pub fn kind(&self) -> Option<Kind> {
+        self.kind
+    }
+
+    /// The wavelengths measured, nm.
+    pub fn wavelengths(&self) -> &[f64] {
+        &self.wavelengths
+    }
+
+    /// The number of spectra.
+    #[allow(clippy::len_without_is_empty)] // a table is never empty
+    pub fn len(&self) -> usize {
+        self.spectra.ncols()
+    }
+
+    /// The values of one spectrum, a value a wavelength.
+    pub fn spectrum(&self, index: usize) -> &[f64] {
+        let bands = self.wavelengths.len();
+        &self.spectra.as_slice()[index * bands..(index + 1) * bands]
+    }
+
+    fn resample(&self, grid: Grid, extend: Extend) -> Result<DMatrix<f64>, DatasetError> {
+        let (first, last) = (self.wavelengths[0], self.wavelengths[self.wavelengths.len() - 1]);
+        if extend == Extend::Error && (grid.first() < first || grid.last() > last) {
+            return Err(DatasetError::Range { name: self.name.clone(), first, last, grid });
+        }
+        let mut columns = DMatrix::zeros(grid.len(), self.len());
+        for (j, mut column) in columns.column_iter_mut().enumerate() {
+            let spline = Spline::new(&self.wavelengths, self.spectrum(j));
+            for (value, wavelength) in column.iter_mut().zip(grid.wavelengths()) {
+                *value = spline.at(wavelength, extend);
+            }
+        }
+        Ok(columns)
+    }
+}
+
+/// Spectra of one or more sources on one grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dataset {
+    grid: Grid,
+    /// A column a spectrum.
+    spectra: DMatrix<f64>,
+    sources: Vec<String>,
+}
+
+impl Dataset {
+    /// Brings `tables` to `grid` and puts them together, in order. See [`Extend`] for wavelengths outside a table's.
+    pub fn new(tables: &[Table], grid: Grid, extend: Extend) -> Result<Dataset, DatasetError> {
+        if tables.is_empty() {
+            return Err(DatasetError::NoSpectra { name: "an empty list of tables".to_owned() });
+        }
+        let columns: Vec<_> = tables.iter().map(|t| t.resample(grid, extend)).collect::<Result<_, _>>()?;
+        let count = columns.iter().map(DMatrix::ncols).sum();
+        let values = columns.iter().flat_map(|c| c.iter().copied());
+        let spectra = DMatrix::from_iterator(grid.len(), count, values);
+        let sources = tables.iter().map(|t| format!("{} ({} spectra)", t.name, t.len())).collect();
+        Ok(Dataset { grid, spectra, sources })
+    }
+
+    /// The wavelengths.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The spectra: a row a band, a column a spectrum.
+    pub fn spectra(&self) -> &DMatrix<f64> {
+        &self.spectra
+    }
+
+    /// Where the spectra come from, a line each.
+    pub fn sources(&self) -> &[String] {
+        &self.sources
+    }
+
+    /// The source of spectrum `index` and its number there, from 1: what a message should call it.
+    pub(crate) fn place(&self, index: usize) -> String {
+        match self.sources.as_slice() {
+            [only] => format!("spectrum {} of {only}", index + 1),
+            all => format!("spectrum {} of {}", index + 1, all.join(" + ")),
+        }
+    }
+}
+
+fn read_capped(path: &Path) -> Result<Vec<u8>, DatasetError> {
+    let failed = |source| DatasetError::Read { path: path.to_owned(), source };
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(failed)?;
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    match bytes.len() as u64 {
+        0 => Err(DatasetError::Empty { path: path.to_owned() }),
+        n if n > MAX_BYTES => Err(DatasetError::TooLarge { path: path.to_owned() }),
+        _ => Ok(bytes),
+    }
+}

@@ -1,0 +1,207 @@
+//! The GPU engine: a device of its own, and a ring of windows in flight.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::Instant;
+
+use wgpu::{BufferUsages, Features, PollType};
+
+use super::{Adapter, Batch, EngineError, Pace};
+use crate::recipe::Recipe;
+use crate::sampler::{Prepared, Sampler};
+use crate::stream::Draws;
+
+/// How many windows are in flight: one with the caller, one being computed, one waiting to be.
+const RING: usize = 3;
+
+/// An open device.
+#[derive(Debug)]
+pub(super) struct Gpu {
+    adapter: Adapter,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    /// Whether the host can map what shaders write, which spares a copy where memory is shared.
+    shared_memory: bool,
+    /// The first error that the device reported outside of any call.
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    pub(super) fn open(adapter: wgpu::Adapter) -> Result<Gpu, EngineError> {
+        let description = Adapter::of(&adapter);
+        let shares =
+            matches!(adapter.get_info().device_type, wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu);
+        let mut wanted = Features::SHADER_INT64;
+        wanted.set(Features::MAPPABLE_PRIMARY_BUFFERS, shares);
+        let features = adapter.features() & wanted;
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("spectroll"),
+            required_features: features,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .map_err(|e| EngineError::Gpu { adapter: description.to_string(), reason: e.to_string() })?;
+
+        // Without a handler wgpu panics. With one, work that follows the first error is void and says so.
+        let fault = Arc::new(Mutex::new(None));
+        let note = {
+            let fault = fault.clone();
+            move |reason: String| {
+                fault.lock().expect("no holder panics").get_or_insert(reason);
+            }
+        };
+        let note_lost = note.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(error.to_string())));
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                note_lost(format!("the device was lost: {message}"));
+            }
+        });
+        let shared_memory = features.contains(Features::MAPPABLE_PRIMARY_BUFFERS);
+        Ok(Gpu { adapter: description, device, queue, shared_memory, fault })
+    }
+
+    pub(super) fn adapter(&self) -> &Adapter {
+        &self.adapter
+    }
+
+    pub(super) fn draw<E: From<EngineError>>(
+        &self,
+        recipe: &Recipe,
+        draws: Draws,
+        sink: &mut impl FnMut(Batch) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let sampler = Sampler::new(&self.device, recipe);
+        let mut pace = Pace::new(recipe, sampler.max_count(&self.device.limits()));
+        let capacity = draws.part(0, pace.most.min(draws.count));
+        let mut slots =
+            (0..RING).map(|_| Slot::new(self, &sampler, capacity)).collect::<Result<Vec<_>, _>>()?;
+        let mut flying = VecDeque::new();
+        let mut offset = 0;
+        let mut last_end = None;
+        loop {
+            while let Some(part) = pace.window(draws, offset) {
+                let Some(slot) = slots.pop() else { break };
+                flying.push_back(slot.submit(self, part));
+                offset += part.count;
+            }
+            let Some(flight) = flying.pop_front() else { return Ok(()) };
+            let waited = self.land(&flight)?;
+            // Where it was not waited for, the caller sets the pace, and the window says nothing of the device. The
+            // first one says how long the shader took to compile.
+            if let Some(start) = last_end.filter(|_| waited) {
+                pace.learn(flight.draws.count, start);
+            }
+            last_end = Some(Instant::now());
+            slots.push(flight.read(sink)?);
+        }
+    }
+
+    /// Waits until a window can be read. Says whether that took any waiting.
+    fn land(&self, flight: &Flight) -> Result<bool, EngineError> {
+        let mut waited = false;
+        let mut poll = PollType::Poll;
+        loop {
+            let polled = self.device.poll(poll);
+            if let Some(reason) = self.fault.lock().expect("no holder panics").clone() {
+                return Err(self.error(reason));
+            }
+            polled.map_err(|e| self.error(e.to_string()))?;
+            match flight.state() {
+                Some(Ok(())) => return Ok(waited),
+                Some(Err(e)) => return Err(self.error(e.to_string())),
+                None => waited = true,
+            }
+            poll = PollType::Wait { submission_index: Some(flight.submission.clone()), timeout: None };
+        }
+    }
+
+    fn error(&self, reason: String) -> EngineError {
+        EngineError::Gpu { adapter: self.adapter.to_string(), reason }
+    }
+}
+
+/// Buffers for one window.
+struct Slot {
+    prepared: Prepared,
+    /// Copies of the spectra and the tallies that the host can map, where it cannot map the originals.
+    staging: Option<[wgpu::Buffer; 2]>,
+}
+
+/// A window that was submitted.
+struct Flight {
+    slot: Slot,
+    draws: Draws,
+    submission: wgpu::SubmissionIndex,
+    /// What mapping the spectra and the tallies came to.
+    mapped: [Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>; 2],
+}
+
+impl Slot {
+    fn new(gpu: &Gpu, sampler: &Sampler, capacity: Draws) -> Result<Slot, EngineError> {
+        let usage = if gpu.shared_memory { BufferUsages::MAP_READ } else { BufferUsages::COPY_SRC };
+        let prepared = sampler.prepare_for(&gpu.device, capacity, usage)?;
+        let staging = (!gpu.shared_memory).then(|| {
+            [prepared.spectra(), prepared.tallies()].map(|buffer| {
+                gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("spectroll staging"),
+                    size: buffer.size(),
+                    usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+                    mapped_at_creation: false,
+                })
+            })
+        });
+        Ok(Slot { prepared, staging })
+    }
+
+    fn submit(mut self, gpu: &Gpu, draws: Draws) -> Flight {
+        self.prepared.turn_to(&gpu.queue, draws);
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("spectroll") };
+        let mut encoder = gpu.device.create_command_encoder(&descriptor);
+        self.prepared.record(&mut encoder);
+        if let Some([spectra, tallies]) = &self.staging {
+            encoder.copy_buffer_to_buffer(self.prepared.spectra(), 0, spectra, 0, None);
+            encoder.copy_buffer_to_buffer(self.prepared.tallies(), 0, tallies, 0, None);
+        }
+        let submission = gpu.queue.submit([encoder.finish()]);
+        let mapped = self.readable().map(|buffer| {
+            let state = Arc::new(OnceLock::new());
+            let callback_state = state.clone();
+            buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(callback_state.set(result)));
+            state
+        });
+        Flight { slot: self, draws, submission, mapped }
+    }
+
+    /// The spectra and the tallies, where the host maps them.
+    fn readable(&self) -> [&wgpu::Buffer; 2] {
+        match &self.staging {
+            Some([spectra, tallies]) => [spectra, tallies],
+            None => [self.prepared.spectra(), self.prepared.tallies()],
+        }
+    }
+}
+
+impl Flight {
+    /// Whether both buffers are mapped, or why one is not; `None` as long as that is open.
+    fn state(&self) -> Option<Result<(), wgpu::BufferAsyncError>> {
+        let [spectra, tallies] = self.mapped.each_ref().map(|state| state.get().cloned());
+        Some(spectra?.and(tallies?))
+    }
+
+    /// Hands a window that has landed to `sink`.
+    fn read<E>(self, sink: &mut impl FnMut(Batch) -> Result<(), E>) -> Result<Slot, E> {
+        let [spectra, tallies] = self.slot.readable();
+        {
+            let count = self.draws.count as usize;
+            let view = |buffer: &wgpu::Buffer| buffer.get_mapped_range(..).expect("it has landed");
+            let (spectra, tallies) = (view(spectra), view(tallies));
+            let tallies = &bytemuck::cast_slice(&tallies)[..count];
+            let values = self.slot.prepared.bands() * count;
+            sink(Batch { draws: self.draws, spectra: &bytemuck::cast_slice(&spectra)[..values], tallies })?;
+        }
+        spectra.unmap();
+        tallies.unmap();
+        Ok(self.slot)
+    }
+}

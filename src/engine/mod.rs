@@ -1,0 +1,220 @@
+//! Draws in order, for programs without a GPU device of their own: on an adapter that this module opens, or on the CPU.
+//!
+//! A range is cut into windows. While a window is handed to the caller the next ones are being computed, and memory is
+//! bounded by the windows in flight, whatever the range. Where the cuts fall never shows in the draws.
+
+mod adapter;
+mod cpu;
+mod gpu;
+
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+pub use adapter::{Adapter, adapters};
+
+use crate::program::Tally;
+use crate::recipe::Recipe;
+use crate::sampler::SamplerError;
+use crate::stream::Draws;
+
+/// The most bytes of spectra in one window.
+const WINDOW_BYTES: u64 = 16 << 20;
+
+/// How long a window should take: short enough for an interrupt and for any watchdog, long enough to hide the cost of
+/// starting one.
+const WINDOW_TIME: Duration = Duration::from_millis(60);
+
+/// Where to draw.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// On the best adapter there is, and on the CPU where there is none.
+    #[default]
+    Auto,
+    /// On the best adapter, hardware before software.
+    Gpu,
+    /// On the adapter of this index in [`adapters`], or whose name holds this text, in any case.
+    Adapter(String),
+    /// On the CPU, without any driver.
+    Cpu,
+}
+
+/// Why draws cannot be made, or not all of them.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what the fields are
+pub enum EngineError {
+    #[error("no adapter {wanted:?}; {}", available(found))]
+    NoAdapter { wanted: String, found: Vec<Adapter> },
+    #[error(
+        "no graphics adapter was found: install a Vulkan driver (Debian: mesa-vulkan-drivers), or pass --engine cpu"
+    )]
+    NoAdapters,
+    #[error("adapter {adapter}: {reason}")]
+    Gpu { adapter: String, reason: String },
+    #[error(transparent)]
+    Range(#[from] SamplerError),
+    #[error(
+        "draw {index} found no acceptable candidate in {attempts} attempts: allow more, or ask for less extreme spectra"
+    )]
+    Exhausted { index: u64, attempts: u32 },
+}
+
+fn available(found: &[Adapter]) -> String {
+    match found {
+        [] => "this machine has none".to_owned(),
+        all => {
+            let lines = all.iter().enumerate().map(|(i, a)| format!("\n  {i}: {a}"));
+            format!("there are:{}", lines.collect::<String>())
+        }
+    }
+}
+
+/// What draws. See the [module](self).
+///
+/// ```
+/// use spectroll::{Choice, Engine, Model, Recipe, Stream};
+///
+/// let recipe = Recipe::new(&Model::builtin("munsell-vrhel")?).build()?;
+/// let engine = Engine::new(&Choice::Cpu)?;
+/// let spectra = engine.collect(&recipe, Stream::new(1).draws(0..1000))?;
+/// assert_eq!(spectra.len(), 1000 * recipe.model().bands());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Engine {
+    device: Option<gpu::Gpu>,
+}
+
+/// A window of draws, as they are handed to the caller.
+#[derive(Clone, Copy, Debug)]
+pub struct Batch<'a> {
+    /// Which draws these are.
+    pub draws: Draws,
+    /// Their spectra: a value for each draw and band, draw by draw.
+    pub spectra: &'a [f32],
+    /// What each took.
+    pub tallies: &'a [Tally],
+}
+
+/// What a range of draws took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Summary {
+    /// How many draws were made.
+    pub draws: u64,
+    /// How many candidates that took.
+    pub attempts: u64,
+    /// How many draws scaling took to 1 or above in some band ([`Bounds::Base`](crate::Bounds::Base)).
+    pub above_one: u64,
+}
+
+impl Batch<'_> {
+    /// The number of values in a spectrum.
+    pub fn bands(&self) -> usize {
+        self.spectra.len() / self.tallies.len()
+    }
+}
+
+impl Summary {
+    /// The share of candidates that were accepted; `None` where there were none.
+    pub fn acceptance(&self) -> Option<f64> {
+        (self.attempts > 0).then(|| self.draws as f64 / self.attempts as f64)
+    }
+
+    fn add(&mut self, batch: &Batch, max_attempts: u32) -> Result<(), EngineError> {
+        if let Some(failed) = batch.tallies.iter().position(|t| t.attempts() == 0) {
+            let index = batch.draws.first.wrapping_add(failed as u64);
+            return Err(EngineError::Exhausted { index, attempts: max_attempts });
+        }
+        self.draws += batch.draws.count;
+        self.attempts += batch.tallies.iter().map(|t| u64::from(t.attempts())).sum::<u64>();
+        self.above_one += batch.tallies.iter().filter(|t| t.above_one()).count() as u64;
+        Ok(())
+    }
+}
+
+impl Engine {
+    /// Opens what `choice` says. With [`Choice::Auto`], a machine without an adapter gets the CPU.
+    pub fn new(choice: &Choice) -> Result<Engine, EngineError> {
+        let device = match choice {
+            Choice::Cpu => None,
+            Choice::Auto => adapter::best()?.map(gpu::Gpu::open).transpose()?,
+            Choice::Gpu => Some(gpu::Gpu::open(adapter::best()?.ok_or(EngineError::NoAdapters)?)?),
+            Choice::Adapter(wanted) => Some(gpu::Gpu::open(adapter::find(wanted)?)?),
+        };
+        Ok(Engine { device })
+    }
+
+    /// The adapter that draws; `None` on the CPU.
+    pub fn adapter(&self) -> Option<&Adapter> {
+        self.device.as_ref().map(|gpu| gpu.adapter())
+    }
+
+    /// Makes `draws` and hands them to `sink` in order, window by window. The first error ends it.
+    pub fn draw<E: From<EngineError>>(
+        &self,
+        recipe: &Recipe,
+        draws: Draws,
+        mut sink: impl FnMut(Batch) -> Result<(), E>,
+    ) -> Result<Summary, E> {
+        let mut summary = Summary::default();
+        let mut checked = |batch: Batch| {
+            summary.add(&batch, recipe.program().max_attempts)?;
+            sink(batch)
+        };
+        match &self.device {
+            _ if draws.count == 0 => {}
+            Some(gpu) => gpu.draw(recipe, draws, &mut checked)?,
+            None => cpu::draw(recipe, draws, &mut checked)?,
+        }
+        Ok(summary)
+    }
+
+    /// Makes `draws` and returns their spectra: a value for each draw and band, draw by draw.
+    pub fn collect(&self, recipe: &Recipe, draws: Draws) -> Result<Vec<f32>, EngineError> {
+        let mut spectra = Vec::new();
+        self.draw(recipe, draws, |batch| {
+            spectra.extend_from_slice(batch.spectra);
+            Ok::<_, EngineError>(())
+        })?;
+        Ok(spectra)
+    }
+}
+
+impl fmt::Display for Engine {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.adapter() {
+            Some(adapter) => adapter.fmt(f),
+            None => write!(f, "CPU ({} threads)", rayon::current_num_threads()),
+        }
+    }
+}
+
+/// How many draws the next window should have: grows or shrinks towards [`WINDOW_TIME`].
+struct Pace {
+    next: u64,
+    most: u64,
+}
+
+impl Pace {
+    /// For rows of `bands` values. The first window has about 10^5 candidates.
+    fn new(recipe: &Recipe, most: u64) -> Pace {
+        let most = most.min(WINDOW_BYTES / (4 * recipe.model().bands() as u64)).max(2);
+        Pace { next: ((recipe.acceptance() * 1e5) as u64).clamp(2, most), most }
+    }
+
+    /// Learns from a window of `count` draws that took until now from `start`.
+    fn learn(&mut self, count: u64, start: Instant) {
+        let ratio = WINDOW_TIME.as_secs_f64() / start.elapsed().as_secs_f64().max(1e-6);
+        let wanted = count as f64 * ratio.clamp(0.25, 2.0);
+        // Even, so that no window leaves half a thread idle.
+        self.next = (wanted as u64).clamp(2, self.most) / 2 * 2;
+    }
+
+    /// The next window, of what is left from `offset` on.
+    fn window(&self, draws: Draws, offset: u64) -> Option<Draws> {
+        let left = draws.count - offset;
+        (left > 0).then(|| draws.part(offset, left.min(self.next)))
+    }
+}

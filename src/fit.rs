@@ -1,0 +1,153 @@
+//! The fit of a [`Model`] to a [`Dataset`] (Singh et al. 2018, appendix, eq. 1-4 and 6-7): principal components by a
+//! singular value decomposition, in f64.
+
+use nalgebra::{DMatrix, DVector, SVD};
+
+use crate::dataset::{Dataset, Kind};
+use crate::model::{Model, Normalization, Parts};
+
+/// How to fit.
+///
+/// ```
+/// use spectroll::{Builtin, Dataset, Extend, Fit, Grid, Kind};
+///
+/// let data = Dataset::new(&[Builtin::Munsell.table()], Grid::DEFAULT, Extend::Error)?;
+/// let model = Fit::new(Kind::Reflectance).components(3).fit(&data)?;
+/// assert_eq!(model.components(), 3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Fit {
+    kind: Kind,
+    components: usize,
+    normalization: Normalization,
+}
+
+/// Why a model cannot be fitted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what the fields are
+pub enum FitError {
+    #[error("a model needs at least 1 component")]
+    NoComponents,
+    #[error("{components} components need at least {} spectra, and there are {spectra}: ask for fewer with -k", components + 1)]
+    TooFewSpectra { components: usize, spectra: usize },
+    #[error("all {spectra} spectra are identical: there is no variation to model")]
+    NoVariation { spectra: usize },
+    #[error(
+        "the data have rank {rank}, which is less than {components} components: ask for -k {rank} or fewer"
+    )]
+    Rank { components: usize, rank: usize },
+    #[error(
+        "{place}: its mean power is {power}, and only a positive one can be normalised; remove it or pass --normalize none"
+    )]
+    Power { place: String, power: f64 },
+    #[error("the values are too large or too small to square in f64: rescale the data, or normalise")]
+    Scale,
+}
+
+impl Fit {
+    /// A fit of 6 components; illuminants are divided by their mean power, reflectances are left alone.
+    pub fn new(kind: Kind) -> Fit {
+        let normalization = match kind {
+            Kind::Illuminant => Normalization::Mean,
+            Kind::Reflectance => Normalization::None,
+        };
+        Fit { kind, components: 6, normalization }
+    }
+
+    /// Keeps `components` principal components (k).
+    pub fn components(self, components: usize) -> Fit {
+        Fit { components, ..self }
+    }
+
+    /// Divides each spectrum by `normalization` first.
+    pub fn normalization(self, normalization: Normalization) -> Fit {
+        Fit { normalization, ..self }
+    }
+
+    /// Fits the model.
+    pub fn fit(&self, data: &Dataset) -> Result<Model, FitError> {
+        let k = self.components;
+        let (bands, spectra) = data.spectra().shape();
+        if k == 0 {
+            return Err(FitError::NoComponents);
+        }
+        if spectra < k + 1 {
+            return Err(FitError::TooFewSpectra { components: k, spectra });
+        }
+        let mut centred = self.normalized(data)?;
+        let mean = centred.column_mean(); // eq. 2, 6
+        centred.column_iter_mut().for_each(|mut spectrum| spectrum -= &mean);
+
+        // The norm of everything, and of nothing but rounding: below it spectra do not differ.
+        let size = mean.amax().max(centred.amax());
+        let rounding = size * f64::EPSILON;
+        if centred.amax() <= rounding {
+            return Err(FitError::NoVariation { spectra });
+        }
+        // Squares of the data must neither overflow nor vanish; scaling by a power of two costs no digits.
+        let scale = 2f64.powi(-(centred.amax().log2().floor() as i32));
+        let (singular, basis) = decompose(centred * scale);
+        let singular = singular / scale;
+        if !singular[0].is_finite()
+            || singular[0] * singular[0] == 0.0
+            || (singular[0] * singular[0]).is_infinite()
+        {
+            return Err(FitError::Scale);
+        }
+        // As MATLAB's and NumPy's rank: what rounding alone can leave is not a component.
+        let noise = bands.max(spectra) as f64 * f64::EPSILON * singular[0].max(size);
+        let rank = singular.iter().filter(|&&s| s > noise).count();
+        if k > rank {
+            return Err(FitError::Rank { components: k, rank });
+        }
+        let total: f64 = singular.iter().map(|s| s * s).sum();
+        // In the principal frame the weights have mean zero and a diagonal covariance (eq. 4, with 1/M).
+        let variances = singular.rows(0, k).map(|s| s * s / spectra as f64);
+        Ok(Model::new(Parts {
+            kind: self.kind,
+            grid: data.grid(),
+            mean,
+            basis: basis.rows(0, k).into_owned(),
+            weight_mean: DVector::zeros(k),
+            weight_covariance: DMatrix::from_diagonal(&variances),
+            explained_variance: singular.iter().take(k).map(|s| s * s / total).collect(),
+            normalization: self.normalization,
+            sources: data.sources().to_vec(),
+        })
+        .expect("singular vectors are orthonormal and variances are not negative"))
+    }
+
+    /// The spectra, a column each, divided by what `normalization` says (eq. 1).
+    fn normalized(&self, data: &Dataset) -> Result<DMatrix<f64>, FitError> {
+        let mut spectra = data.spectra().clone();
+        for (i, mut spectrum) in spectra.column_iter_mut().enumerate() {
+            let mean = spectrum.mean();
+            let divisor = match self.normalization {
+                Normalization::None => continue,
+                Normalization::Mean => mean,
+                Normalization::Integral => spectrum.sum() * data.grid().step(),
+            };
+            if !(mean > 0.0 && divisor.is_finite()) {
+                return Err(FitError::Power { place: data.place(i), power: mean });
+            }
+            spectrum /= divisor;
+        }
+        Ok(spectra)
+    }
+}
+
+/// The singular values in falling order, and the vectors in band space that belong to them, a row each, with the
+/// largest entry of each made positive: a decomposition leaves the signs open, and a fit must be reproducible.
+fn decompose(columns: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    let svd = SVD::new(columns, true, false); // sorts
+    let mut basis = svd.u.expect("it was asked for").transpose();
+    for mut vector in basis.row_iter_mut() {
+        let largest = vector.iter().copied().fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
+        if largest < 0.0 {
+            vector.neg_mut();
+        }
+    }
+    (svd.singular_values, basis)
+}

@@ -1,0 +1,43 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+// In the order in which the data passes through them.
+mod grid;
+
+mod dataset;
+
+pub mod colorimetry;
+
+mod fit;
+mod model;
+
+mod program;
+mod region;
+
+mod normal;
+mod philox;
+mod stream;
+
+mod cpu;
+mod recipe;
+
+mod wgsl;
+
+mod sampler;
+
+mod engine;
+
+pub mod output;
+
+pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
+pub use engine::{Adapter, Batch, Choice, Engine, EngineError, Summary, adapters};
+pub use fit::{Fit, FitError};
+pub use grid::{Extend, Grid, GridError};
+pub use model::{MAX_COMPONENTS, Model, ModelError, Normalization, Parts};
+pub use normal::Real;
+pub use philox::philox;
+pub use program::{Bounds, Tally};
+pub use recipe::{DEFAULT_MAX_ATTEMPTS, Recipe, RecipeBuilder, RecipeError};
+pub use sampler::{Prepared, Sampler, SamplerError};
+pub use stream::{Draws, Stream, StreamRng};
+pub use wgpu;

@@ -1,0 +1,115 @@
+//! The set of acceptable draws, before any is made: whether it is empty, and how light a reflectance can be.
+//!
+//! Every rule is linear in the standard normals z, so what is accepted is a polytope, and a small linear program
+//! answers exactly what a pilot run could only suspect. Points beyond [`REACH`] standard deviations are left out:
+//! their mass is below 1e-37 a component.
+
+use microlp::{ComparisonOp, OptimizationDirection, Problem, Variable};
+
+use crate::dataset::Kind;
+use crate::program::{Bounds, Program};
+
+/// How far from the mean a draw may lie, in standard deviations of each component.
+const REACH: f64 = 13.0;
+
+/// Coefficients of unit rows below this are dropped: together they move no bound by 1e-7, the solver's tolerance.
+const NEGLIGIBLE: f64 = 1e-10;
+
+/// The bands that leave no room, as indices, where no z is acceptable.
+///
+/// The room is the radius of the largest ball of acceptable z, in standard deviations: a set without volume is empty.
+pub(crate) fn blocking_bands(program: &Program) -> Option<Vec<usize>> {
+    let rows = rows(program);
+    let impossible: Vec<_> = rows.iter().filter(|r| r.norm == 0.0 && r.room <= 0.0).map(|r| r.band).collect();
+    if !impossible.is_empty() {
+        return Some(distinct(impossible));
+    }
+    let k = program.components();
+    let reach = REACH * (k as f64).sqrt() + 1.0;
+    let binding: Vec<_> = rows.iter().filter(|r| r.norm > 0.0 && r.room / r.norm < reach).collect();
+
+    let mut problem = Problem::new(OptimizationDirection::Maximize);
+    let z: Vec<Variable> = (0..k).map(|_| problem.add_var(0.0, (-REACH, REACH))).collect();
+    let radius = problem.add_var(1.0, (-1e6, 1.0));
+    for row in &binding {
+        let unit = row.coefficients.iter().map(|c| c / row.norm);
+        let mut terms: Vec<_> = z.iter().copied().zip(unit).filter(|(_, c)| c.abs() > NEGLIGIBLE).collect();
+        terms.push((radius, 1.0));
+        problem.add_constraint(&terms, ComparisonOp::Le, row.room / row.norm);
+    }
+    // What the solver cannot answer is left to the pilot run, which can.
+    let solution = problem.solve().ok()?.into_solution().ok()?;
+    let largest = solution.var_value(radius);
+    if largest > 1e-7 {
+        return None;
+    }
+    let tight = binding.iter().filter(|row| {
+        let value: f64 =
+            row.coefficients.iter().zip(&z).map(|(c, &z)| c / row.norm * solution.var_value(z)).sum();
+        value + largest > row.room / row.norm - 1e-5
+    });
+    Some(distinct(tight.map(|row| row.band).collect()))
+}
+
+/// The largest luminous reflectance at which some spectrum of the model's shapes is still at most 1 everywhere.
+///
+/// With t = s / max(s) this is a linear program in t = c tau + F y, where tau = 1 / max(s): maximise the LRV of t
+/// under 0 <= t <= 1 and tau >= 0. It is a supremum, approached but not reached where the optimum has tau = 0.
+pub(crate) fn largest_lrv(program: &Program, weights: &[f64]) -> Option<f64> {
+    let mut problem = Problem::new(OptimizationDirection::Maximize);
+    let lrv_of = |values: &[f64]| values.iter().zip(weights).map(|(v, w)| v * w).sum::<f64>();
+    let tau = problem.add_var(lrv_of(&program.offset), (0.0, f64::INFINITY));
+    let mut columns = vec![(tau, program.offset.as_slice())];
+    for gain in program.gain.iter().filter(|gain| gain.iter().any(|&g| g != 0.0)) {
+        columns.push((problem.add_var(lrv_of(gain), (f64::NEG_INFINITY, f64::INFINITY)), gain));
+    }
+    for band in 0..program.bands() {
+        let terms: Vec<_> =
+            columns.iter().map(|(v, column)| (*v, column[band])).filter(|(_, c)| *c != 0.0).collect();
+        if !terms.is_empty() {
+            problem.add_constraint(&terms, ComparisonOp::Ge, 0.0);
+            problem.add_constraint(&terms, ComparisonOp::Le, 1.0);
+        }
+    }
+    Some(problem.solve().ok()?.into_solution().ok()?.objective())
+}
+
+/// One half-space: coefficients . z < room.
+struct Row {
+    band: usize,
+    coefficients: Vec<f64>,
+    norm: f64,
+    room: f64,
+}
+
+fn rows(program: &Program) -> Vec<Row> {
+    let gains = |band: usize| program.gain.iter().map(move |gain| gain[band]);
+    let mut rows = Vec::new();
+    let mut push = |band, coefficients: Vec<f64>, room| {
+        let norm = coefficients.iter().map(|c| c * c).sum::<f64>().sqrt();
+        rows.push(Row { band, coefficients, norm, room });
+    };
+    for band in 0..program.bands() {
+        push(band, gains(band).map(|g| -g).collect(), program.offset[band]); // s > 0
+        if program.kind == Kind::Reflectance && program.tests_base() {
+            push(band, gains(band).collect(), 1.0 - program.offset[band]); // s < 1
+        }
+    }
+    if let Some(target) = program.target.as_ref().filter(|t| t.bounds != Bounds::Base) {
+        let lrv_of = |values: &[f64]| values.iter().zip(&target.weights).map(|(v, w)| v * w).sum::<f64>();
+        let (lrv_offset, lrv_gain) = (lrv_of(&program.offset), program.gain.iter().map(|g| lrv_of(g)));
+        let lrv_gain: Vec<f64> = lrv_gain.collect();
+        for band in 0..program.bands() {
+            // target . s < LRV(s)
+            let coefficients = gains(band).zip(&lrv_gain).map(|(g, l)| target.lrv * g - l).collect();
+            push(band, coefficients, lrv_offset - target.lrv * program.offset[band]);
+        }
+    }
+    rows
+}
+
+fn distinct(mut bands: Vec<usize>) -> Vec<usize> {
+    bands.sort_unstable();
+    bands.dedup();
+    bands
+}

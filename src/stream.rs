@@ -1,0 +1,186 @@
+//! Streams of random words, and which of their draws are meant.
+//!
+//! Draw i is a pure function of the model, the recipe, the seed, the stream and i. The generator's key is the seed
+//! (low word, high word); its counter is (i low, i high, attempt, stream << 8 | block). Attempts 0, 1, 2, ... are the
+//! candidates of draw i, of which the first acceptable one wins. Blocks 0, 1, ... of an attempt hold the words of its
+//! normals, four a block; block 255 of attempt 0 is kept for uniforms that belong to a draw rather than to an attempt,
+//! and block 254 of attempt 0 feeds [`StreamRng`].
+
+use std::convert::Infallible;
+use std::ops::{Bound, RangeBounds};
+
+use rand::TryRng;
+
+use crate::philox::philox;
+
+/// The block that [`StreamRng`] reads, beyond any that normals use.
+const RNG_BLOCK: u32 = 254;
+
+/// A source of random words: a seed, and one of 2^24 streams under it. Draws of different streams or seeds are
+/// independent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Stream {
+    seed: u64,
+    id: u32,
+}
+
+impl Stream {
+    /// The stream 0 of a seed.
+    pub const fn new(seed: u64) -> Stream {
+        Stream { seed, id: 0 }
+    }
+
+    /// The stream of a name, so that adding a group of draws to a scene does not change another: its 32-bit FNV-1a hash
+    /// h, folded to 24 bits as (h >> 24) ^ (h & 0xffffff).
+    pub fn named(seed: u64, name: &str) -> Stream {
+        let hash =
+            name.bytes().fold(0x811C_9DC5, |h: u32, byte| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193));
+        Stream { seed, id: (hash >> 24) ^ (hash & 0x00FF_FFFF) }
+    }
+
+    /// The seed.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// The stream's number, below 2^24.
+    pub fn id(&self) -> u32 {
+        self.id
+    }
+
+    /// The key: the seed's low and high words.
+    pub(crate) fn key(&self) -> [u32; 2] {
+        words(self.seed)
+    }
+
+    /// The four words of a block of an attempt of draw `index`.
+    #[inline]
+    pub fn block(&self, index: u64, attempt: u32, block: u32) -> [u32; 4] {
+        debug_assert!(block < 256);
+        let [low, high] = words(index);
+        philox([low, high, attempt, self.id << 8 | block], self.key())
+    }
+
+    /// The draws of a range of indices, `0..1000` or `5..=u64::MAX`.
+    pub fn draws(self, range: impl RangeBounds<u64>) -> Draws {
+        let first = match range.start_bound() {
+            Bound::Included(&first) => first,
+            Bound::Excluded(&before) => before.saturating_add(1),
+            Bound::Unbounded => 0,
+        };
+        let count = match range.end_bound() {
+            Bound::Included(&last) if last < first => 0,
+            Bound::Included(&last) => (last - first).saturating_add(1),
+            Bound::Excluded(&end) => end.saturating_sub(first),
+            Bound::Unbounded => u64::MAX - first,
+        };
+        Draws { stream: self, first, count }
+    }
+
+    /// A sequential generator over the stream, for code that wants one of `rand`'s. Its words are not those of any
+    /// draw of the stream.
+    pub fn rng(self) -> StreamRng {
+        StreamRng { stream: self, next: 0, words: [0; 4], used: 4 }
+    }
+}
+
+/// The low and high words of a 64-bit number: the order in which the counter and the shader hold them.
+pub(crate) fn words(x: u64) -> [u32; 2] {
+    [x as u32, (x >> 32) as u32]
+}
+
+/// Which draws: `count` of them, from index `first` of a stream on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Draws {
+    /// Where their words come from.
+    pub stream: Stream,
+    /// The index of the first.
+    pub first: u64,
+    /// How many there are. Indices are 64-bit numbers, and those beyond the last follow as 0, 1, ...
+    pub count: u64,
+}
+
+impl Draws {
+    /// The part of these that starts `offset` draws in and has `count` of them.
+    pub(crate) fn part(&self, offset: u64, count: u64) -> Draws {
+        Draws { first: self.first.wrapping_add(offset), count, ..*self }
+    }
+}
+
+/// `rand`'s generator trait over a [`Stream`]: 2^66 words before it repeats.
+#[derive(Clone, Debug)]
+pub struct StreamRng {
+    stream: Stream,
+    next: u64,
+    words: [u32; 4],
+    used: usize,
+}
+
+impl TryRng for StreamRng {
+    type Error = Infallible;
+
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        if self.used == self.words.len() {
+            self.words = self.stream.block(self.next, 0, RNG_BLOCK);
+            self.next = self.next.wrapping_add(1);
+            self.used = 0;
+        }
+        let word = self.words[self.used];
+        self.used += 1;
+        Ok(word)
+    }
+
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        rand::rand_core::utils::next_u64_via_u32(self)
+    }
+
+    fn try_fill_bytes(&mut self, out: &mut [u8]) -> Result<(), Infallible> {
+        for chunk in out.chunks_mut(4) {
+            chunk.copy_from_slice(&self.try_next_u32()?.to_le_bytes()[..chunk.len()]);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::Rng;
+
+    /// FNV-1a of "" is its offset basis, and of "a" a published test vector: 811c9dc5 and e40c292c.
+    #[test]
+    fn streams_are_named_by_fnv() {
+        assert_eq!(Stream::named(0, "").id(), 0x81 ^ 0x001C_9DC5);
+        assert_eq!(Stream::named(0, "a").id(), 0xE4 ^ 0x000C_292C);
+        assert_eq!(Stream::new(7).id(), 0);
+    }
+
+    #[test]
+    fn the_counter_holds_index_attempt_stream_and_block() {
+        let stream = Stream { seed: 0x0123_4567_89AB_CDEF, id: 0x00AB_CDEF };
+        let expected = philox([0x5566_7788, 0x1122_3344, 9, 0xABCD_EF03], [0x89AB_CDEF, 0x0123_4567]);
+        assert_eq!(stream.block(0x1122_3344_5566_7788, 9, 3), expected);
+    }
+
+    #[test]
+    fn ranges_of_draws() {
+        let stream = Stream::new(1);
+        let parts = |d: Draws| (d.first, d.count);
+        assert_eq!(parts(stream.draws(3..10)), (3, 7));
+        assert_eq!(parts(stream.draws(..5)), (0, 5));
+        assert_eq!(parts(stream.draws(u64::MAX - 2..=u64::MAX)), (u64::MAX - 2, 3));
+        assert_eq!(parts(stream.draws(5..5)), (5, 0));
+        assert_eq!(parts(stream.draws(3..10).part(2, 4)), (5, 4));
+    }
+
+    #[test]
+    fn the_generator_gives_the_words_of_its_blocks() {
+        let stream = Stream::new(5);
+        let mut rng = stream.rng();
+        let words: Vec<u32> = (0..8).map(|_| rng.next_u32()).collect();
+        assert_eq!(words, [stream.block(0, 0, 254), stream.block(1, 0, 254)].concat());
+        let mut bytes = [0; 6];
+        stream.rng().fill_bytes(&mut bytes);
+        assert_eq!(bytes, [words[0].to_le_bytes().as_slice(), &words[1].to_le_bytes()[..2]].concat()[..]);
+    }
+}
