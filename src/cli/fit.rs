@@ -1,0 +1,131 @@
+//! `spectroll fit`: a model file from measured spectra.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use spectroll::output::{Existing, write_file};
+use spectroll::{Builtin, Dataset, Extend, Fit, Grid, Kind, Model, Normalization, Table};
+
+use super::{Usage, grouped};
+
+/// Fit a model to measured spectra
+///
+/// Files are MATLAB v5 (a matrix X of spectra in columns, and S_X = [start step count] beside it; FILE.mat:X picks one
+/// of several) or CSV (wavelengths in the first column, a spectrum in each other one). The names munsell and vrhel
+/// stand for built-in tables. Several are fitted together.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Files of spectra, or munsell, vrhel
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<String>,
+    /// The number of components
+    #[arg(short = 'k', long, default_value_t = 6, value_name = "K")]
+    components: usize,
+    /// What the spectra are [default: what the name of the variable says: sur_X, spd_X, daylightX]
+    #[arg(long, value_enum)]
+    kind: Option<KindName>,
+    /// The wavelengths, start:step:stop in nm
+    #[arg(long, default_value_t = Grid::DEFAULT, value_name = "GRID")]
+    wavelengths: Grid,
+    /// What each spectrum is divided by first [default: mean for illuminants, none for reflectances]
+    #[arg(long, value_enum)]
+    normalize: Option<NormalizationName>,
+    /// What a spectrum is outside the wavelengths at which it was measured
+    #[arg(long, value_enum, default_value = "error")]
+    extend: ExtendName,
+    /// The model file
+    #[arg(short, long, value_name = "MODEL.json")]
+    output: PathBuf,
+    /// Replace the model file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum KindName {
+    Reflectance,
+    Illuminant,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum NormalizationName {
+    /// Its mean power
+    Mean,
+    /// Its integral over the wavelengths
+    Integral,
+    /// Nothing
+    None,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ExtendName {
+    /// Unknown, and so an error
+    Error,
+    /// What it is at the nearer end
+    Hold,
+    /// Zero
+    Zero,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let tables = arguments.files.iter().map(|f| table(f)).collect::<anyhow::Result<Vec<_>>>()?;
+    let kind = kind(arguments, &tables)?;
+    let extend = match arguments.extend {
+        ExtendName::Error => Extend::Error,
+        ExtendName::Hold => Extend::Hold,
+        ExtendName::Zero => Extend::Zero,
+    };
+    let data = Dataset::new(&tables, arguments.wavelengths, extend)?;
+    let mut fit = Fit::new(kind).components(arguments.components);
+    if let Some(normalize) = arguments.normalize {
+        fit = fit.normalization(match normalize {
+            NormalizationName::Mean => Normalization::Mean,
+            NormalizationName::Integral => Normalization::Integral,
+            NormalizationName::None => Normalization::None,
+        });
+    }
+    let model = fit.fit(&data)?;
+    let existing = if arguments.force { Existing::Replace } else { Existing::Keep };
+    write_file(&arguments.output, existing, (model.to_json() + "\n").as_bytes())?;
+    report(&model, &data, &arguments.output);
+    Ok(())
+}
+
+fn report(model: &Model, data: &Dataset, path: &Path) {
+    let explained: f64 = model.parts().explained_variance.iter().sum();
+    eprintln!(
+        "{}: {} components explain {:.2} % of {} {}s at {} nm",
+        path.display(),
+        model.components(),
+        100.0 * explained,
+        grouped(data.spectra().ncols() as u64),
+        model.kind(),
+        model.grid(),
+    );
+}
+
+/// The table of a built-in name, a file, or file:variable.
+fn table(name: &str) -> anyhow::Result<Table> {
+    if let Some(builtin) = Builtin::named(name) {
+        return Ok(builtin.table());
+    }
+    let (path, variable) = match name.rsplit_once(':') {
+        Some((file, variable)) if !Path::new(name).exists() => (file, Some(variable)),
+        _ => (name, None),
+    };
+    Ok(Table::open(Path::new(path), variable)?)
+}
+
+/// What the spectra are: as said, else as their names say, if those agree.
+fn kind(arguments: &Arguments, tables: &[Table]) -> anyhow::Result<Kind> {
+    if let Some(kind) = arguments.kind {
+        return Ok(match kind {
+            KindName::Reflectance => Kind::Reflectance,
+            KindName::Illuminant => Kind::Illuminant,
+        });
+    }
+    let kinds: Vec<_> = tables.iter().map(Table::kind).collect();
+    let first = kinds[0].filter(|first| kinds.iter().all(|kind| *kind == Some(*first)));
+    let unknown = "cannot tell what these spectra are: pass --kind reflectance or --kind illuminant";
+    Ok(first.ok_or_else(|| Usage(unknown.to_owned()))?)
+}

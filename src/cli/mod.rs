@@ -1,0 +1,157 @@
+//! The command line: a module a command. Each takes its arguments and returns an error, which is printed here, once,
+//! with the exit code that its kind has.
+
+mod adapters;
+mod bench;
+mod fit;
+mod inspect;
+mod picture;
+mod sample;
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::{Parser, Subcommand, ValueEnum};
+use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, RecipeError};
+
+/// Draws random, physically valid natural spectra on the GPU.
+#[derive(Parser)]
+#[command(version, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  spectroll sample munsell-vrhel -n 1000000 -o reflectances.npy
+  spectroll sample granada -n 1000 -o - --seed 7 > daylights.csv
+  spectroll sample munsell-vrhel -n 10000 --lrv 0.4 --bounds scaled -o targets.npy
+  spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
+  spectroll inspect munsell-vrhel -o munsell-vrhel.png
+
+Exit codes: 0 done, 1 failed while running, 2 wrong usage or impossible request, 3 no such adapter,
+4 bad input data, 130 interrupted.";
+
+#[derive(Subcommand)]
+enum Command {
+    Fit(fit::Arguments),
+    Sample(sample::Arguments),
+    Inspect(inspect::Arguments),
+    Adapters(adapters::Arguments),
+    Bench(bench::Arguments),
+}
+
+/// Where to draw.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EngineName {
+    /// The best graphics adapter; the CPU where there is none
+    Auto,
+    /// The best graphics adapter
+    Gpu,
+    /// The CPU, without any driver
+    Cpu,
+}
+
+/// The choice of what draws, for the commands that do.
+#[derive(clap::Args)]
+struct EngineArguments {
+    /// What draws [default: auto]
+    #[arg(long, value_enum, conflicts_with = "adapter")]
+    engine: Option<EngineName>,
+    /// Draw on the adapter of this index or name (see `spectroll adapters`)
+    #[arg(long, value_name = "NAME|INDEX")]
+    adapter: Option<String>,
+}
+
+impl EngineArguments {
+    /// What was asked for; nothing where it was not.
+    fn choice(&self) -> Option<Choice> {
+        let named = self.engine.map(|engine| match engine {
+            EngineName::Auto => Choice::Auto,
+            EngineName::Gpu => Choice::Gpu,
+            EngineName::Cpu => Choice::Cpu,
+        });
+        self.adapter.clone().map(Choice::Adapter).or(named)
+    }
+}
+
+/// Somebody pressed Ctrl-C.
+#[derive(Debug, thiserror::Error)]
+#[error("interrupted; nothing was left behind")]
+struct Interrupted;
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// An error once Ctrl-C was pressed: long work asks from time to time.
+fn check_interrupt() -> Result<(), Interrupted> {
+    if INTERRUPTED.load(Ordering::Relaxed) { Err(Interrupted) } else { Ok(()) }
+}
+
+/// Runs the program.
+pub(crate) fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed)).expect("this is the only handler");
+    let result = match &arguments.command {
+        Command::Fit(arguments) => fit::run(arguments),
+        Command::Sample(arguments) => sample::run(arguments),
+        Command::Inspect(arguments) => inspect::run(arguments),
+        Command::Adapters(arguments) => adapters::run(arguments),
+        Command::Bench(arguments) => bench::run(arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS, // the reader has what it wanted
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(exit_code(&error))
+        }
+    }
+}
+
+fn exit_code(error: &anyhow::Error) -> u8 {
+    let is_missing = |e: &EngineError| matches!(e, EngineError::NoAdapter { .. } | EngineError::NoAdapters);
+    if error.is::<Interrupted>() {
+        130
+    } else if error.downcast_ref::<EngineError>().is_some_and(is_missing) {
+        3
+    } else if error.is::<DatasetError>() || error.is::<FitError>() || error.is::<ModelError>() {
+        4
+    } else if error.is::<RecipeError>() || error.is::<Usage>() {
+        2
+    } else {
+        1
+    }
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let broken = |e: &std::io::Error| e.kind() == std::io::ErrorKind::BrokenPipe;
+    error.chain().any(|cause| cause.downcast_ref().is_some_and(broken))
+}
+
+/// A request that cannot be meant, beyond what the argument parser can tell.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Usage(String);
+
+/// The model of a name: a built-in one, or a file.
+fn model(name: &str) -> anyhow::Result<Model> {
+    if Model::BUILTIN.contains(&name) {
+        return Ok(Model::builtin(name)?);
+    }
+    if !Path::new(name).exists() {
+        let builtin = Model::BUILTIN.join(", ");
+        anyhow::bail!(Usage(format!(
+            "{name:?} is neither a file nor a built-in model ({builtin}); `spectroll fit` makes models"
+        )));
+    }
+    Ok(Model::load(Path::new(name))?)
+}
+
+/// A number with its thousands set apart.
+fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let groups: Vec<_> = digits.as_bytes().rchunks(3).rev().map(|g| String::from_utf8_lossy(g)).collect();
+    groups.join(",")
+}
