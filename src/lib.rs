@@ -26,6 +26,8 @@ mod wgsl;
 mod sampler;
 
 mod engine;
+#[cfg(test)]
+mod probe;
 
 pub mod output;
 

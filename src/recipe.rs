@@ -69,10 +69,7 @@ pub enum RecipeError {
         nanometres(wavelengths)
     )]
     Empty { wavelengths: Vec<f64> },
-    #[error(
-        "too few candidates would be accepted: {}, so {max_attempts} attempts would fail for one draw in {:.0e}; {}",
-        estimate(*acceptance), 1.0 / failure(*acceptance, *max_attempts), remedy(*acceptance)
-    )]
+    #[error("too few candidates would be accepted: {}", hopeless(*acceptance, *max_attempts))]
     Hopeless { acceptance: f64, max_attempts: u32 },
 }
 
@@ -206,21 +203,16 @@ fn failure(acceptance: f64, attempts: u32) -> f64 {
     (f64::from(attempts) * (-acceptance).ln_1p()).exp()
 }
 
-fn estimate(acceptance: f64) -> String {
-    match acceptance {
-        0.0 => format!("none of {PILOT} was"),
-        a => format!("an estimated {a:.1e} of them"),
+fn hopeless(acceptance: f64, max_attempts: u32) -> String {
+    if acceptance == 0.0 {
+        return format!("none of {PILOT} was; ask for less extreme spectra");
     }
-}
-
-fn remedy(acceptance: f64) -> String {
-    let needed = TOLERABLE_FAILURE.ln() / (-acceptance).ln_1p();
-    match acceptance {
-        a if a > 0.0 => {
-            format!("allow at least {:.0} attempts, or ask for less extreme spectra", needed.ceil())
-        }
-        _ => "ask for less extreme spectra".to_owned(),
-    }
+    let needed = (TOLERABLE_FAILURE.ln() / (-acceptance).ln_1p()).ceil();
+    format!(
+        "an estimated {acceptance:.1e} of them, so that one draw in {:.1e} would fail in all its {max_attempts} attempts; \
+         allow at least {needed:.0} attempts, or ask for less extreme spectra",
+        1.0 / failure(acceptance, max_attempts)
+    )
 }
 
 fn nanometres(wavelengths: &[f64]) -> String {

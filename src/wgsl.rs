@@ -266,3 +266,103 @@ impl Text {
             .expect("no I/O");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    use super::*;
+    use crate::program::{self, Bounds};
+
+    /// A program of 3 bands and 2 components, small enough to read.
+    fn small(kind: Kind, target: Option<(f64, Bounds)>) -> Program {
+        program_of(kind, 3, 2, target)
+    }
+
+    fn program_of(kind: Kind, bands: usize, components: usize, target: Option<(f64, Bounds)>) -> Program {
+        let weights = vec![1.0 / bands as f64; bands];
+        Program {
+            kind,
+            offset: (0..bands).map(|b| 0.5 + 0.125 * (b % 3) as f64).collect(),
+            gain: (0..components)
+                .map(|j| (0..bands).map(|b| 0.25 / (1 + j + b % 7) as f64).collect())
+                .collect(),
+            target: target.map(|(lrv, bounds)| program::Target { lrv, weights, bounds }),
+            max_attempts: 100,
+        }
+    }
+
+    fn validate(text: &str, capabilities: Capabilities) -> Result<(), String> {
+        let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
+        let mut validator = Validator::new(ValidationFlags::all(), capabilities);
+        validator.validate(&module).map(drop).map_err(|e| e.emit_to_string(text))
+    }
+
+    #[test]
+    fn every_variant_is_valid_with_no_more_than_it_says() {
+        let rules = [None, Some(Bounds::Base), Some(Bounds::Scaled), Some(Bounds::Both)];
+        for (bands, components) in [(1, 1), (3, 2), (31, 6), (61, 12), (70, 64), (1000, 64)] {
+            for kind in [Kind::Illuminant, Kind::Reflectance] {
+                for rule in rules.into_iter().filter(|rule| kind == Kind::Reflectance || rule.is_none()) {
+                    let program = program_of(kind, bands, components, rule.map(|bounds| (0.4, bounds)));
+                    for (target, needs) in [
+                        (Target::Baseline, Capabilities::empty()),
+                        (Target::Int64, Capabilities::SHADER_INT64),
+                        (Target::SoftwareInt64, Capabilities::SHADER_INT64),
+                    ] {
+                        let checked = validate(&shader(&program, target), needs);
+                        assert!(
+                            checked.is_ok(),
+                            "{kind} {bands}x{components} {rule:?} {target:?}: {}",
+                            checked.unwrap_err()
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn int64_is_not_taken_without_asking() {
+        let text = shader(&small(Kind::Illuminant, None), Target::Int64);
+        assert!(validate(&text, Capabilities::empty()).is_err());
+    }
+
+    /// The text between the fragments, for each kind of recipe: a change here is a decision.
+    #[test]
+    fn what_is_generated() {
+        let reflectance = |target| small(Kind::Reflectance, target);
+        for (name, text) in [
+            ("illuminant", unrolled(&small(Kind::Illuminant, None), false)),
+            ("reflectance", unrolled(&reflectance(None), false)),
+            ("reflectance_in_pairs", unrolled(&reflectance(None), true)),
+            ("lrv_base", unrolled(&reflectance(Some((0.4, Bounds::Base))), false)),
+            ("lrv_scaled", unrolled(&reflectance(Some((0.4, Bounds::Scaled))), false)),
+            ("lrv_both_in_pairs", unrolled(&reflectance(Some((0.4, Bounds::Both))), true)),
+            ("lrv_both_looped", looped(&reflectance(Some((0.4, Bounds::Both))))),
+        ] {
+            insta::assert_snapshot!(name, text);
+        }
+    }
+
+    #[test]
+    fn what_is_not_asked_for_is_not_in_the_text() {
+        let plain = shader(&small(Kind::Reflectance, None), Target::Baseline);
+        let light = shader(&small(Kind::Illuminant, None), Target::Baseline);
+        let target = shader(&small(Kind::Reflectance, Some((0.4, Bounds::Scaled))), Target::Baseline);
+        for absent in ["lrv", "factor", "u64", "model"] {
+            assert!(!plain.contains(absent) && !light.contains(absent), "{absent}");
+        }
+        assert!(target.contains("lrv"));
+        let one = format!("{}u", 1f32.to_bits() - 1);
+        assert!(plain.contains(&one) && !light.contains(&one), "an illuminant has no upper bound");
+    }
+
+    #[test]
+    fn numbers_read_back_as_they_are() {
+        for value in [0.1, -1e-7, 1.0, 123456.78, 1e-30, f64::from(f32::MIN_POSITIVE), 1e30] {
+            let text = float(value);
+            assert_eq!(text.strip_suffix('f').unwrap().parse::<f32>().unwrap(), value as f32, "{text}");
+        }
+    }
+}

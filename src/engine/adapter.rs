@@ -23,7 +23,7 @@ pub struct Adapter {
 
 impl fmt::Display for Adapter {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{} ({}, {}, {})", self.name, self.backend, self.kind, self.driver)
+        write!(f, "{} [{}, {}, {}]", self.name, self.kind, self.backend, self.driver)
     }
 }
 

@@ -65,6 +65,11 @@ impl Gpu {
         &self.adapter
     }
 
+    #[cfg(test)]
+    pub(super) fn device(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.device, &self.queue)
+    }
+
     pub(super) fn draw<E: From<EngineError>>(
         &self,
         recipe: &Recipe,

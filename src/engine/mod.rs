@@ -151,6 +151,12 @@ impl Engine {
         self.device.as_ref().map(|gpu| gpu.adapter())
     }
 
+    /// The device that draws and its queue, for tests of what runs on it.
+    #[cfg(test)]
+    pub(crate) fn device(&self) -> Option<(&wgpu::Device, &wgpu::Queue)> {
+        self.device.as_ref().map(gpu::Gpu::device)
+    }
+
     /// Makes `draws` and hands them to `sink` in order, window by window. The first error ends it.
     pub fn draw<E: From<EngineError>>(
         &self,
