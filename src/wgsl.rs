@@ -125,11 +125,12 @@ fn unrolled(program: &Program, paired: bool) -> String {
             body.line(&format!("return Normals({});", list(k, normal)));
         },
     );
+    text.line("");
     for b in 0..n {
         let gains =
             program.gain.iter().enumerate().map(|(j, gain)| format!(" + {} * z.z{j}", float(gain[b])));
         let sum = float(program.offset[b]) + &gains.collect::<String>();
-        text.line(&format!("\nfn band{b}(z: Normals) -> f32 {{ return {sum}; }}"));
+        text.line(&format!("fn band{b}(z: Normals) -> f32 {{ return {sum}; }}"));
     }
     text.block("fn spectrum(z: Normals) -> Spectrum", |body| {
         body.line(&format!("return Spectrum({});", list(n, |b| format!("band{b}(z)"))));
