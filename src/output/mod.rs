@@ -32,6 +32,8 @@ pub enum OutputError {
     Exists { path: PathBuf },
     #[error("{path:?} is a folder: name a file")]
     Folder { path: PathBuf },
+    #[error("{path:?} is not a plain file, and would be replaced by one: name another")]
+    Special { path: PathBuf },
     #[error("{folder:?} does not exist: create it first")]
     NoFolder { folder: PathBuf },
     #[error("cannot write {path:?}: {source}")]
@@ -87,6 +89,9 @@ impl Pending {
         let path = path.to_owned();
         if path.is_dir() {
             return Err(OutputError::Folder { path });
+        }
+        if path.exists() && !path.is_file() {
+            return Err(OutputError::Special { path }); // a device, say: --force -o /dev/null must not replace it
         }
         if existing == Existing::Keep && path.symlink_metadata().is_ok() {
             return Err(OutputError::Exists { path });

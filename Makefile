@@ -1,0 +1,32 @@
+# Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
+.PHONY: demo test bench driver python
+.DEFAULT_GOAL := demo
+
+VENV := target/venv
+export SPECTROLL_PYTHON := $(abspath $(VENV))/bin/python
+
+# A million reflectances, and a picture of what they are drawn from.
+demo: driver
+	cargo build --locked --release
+	target/release/spectroll sample munsell-vrhel -n 1000000 -o target/reflectances.npy --force
+	target/release/spectroll inspect munsell-vrhel -o target/munsell-vrhel.png --force
+
+test: driver python
+	cargo test --locked --release
+
+# In-process and whole-process rates, beside NumPy and Numba.
+bench: driver python
+	cargo build --locked --release
+	$(SPECTROLL_PYTHON) -m pip install --quiet numba
+	$(SPECTROLL_PYTHON) scripts/bench.py
+
+# A Vulkan driver: Mesa's software one where there is none.
+driver:
+	@sh scripts/driver.sh
+
+# NumPy and SciPy, against which fits and files are tested.
+python: $(VENV)/ready
+
+$(VENV)/ready:
+	@sh scripts/python.sh $(VENV)
+	@touch $@

@@ -1,0 +1,210 @@
+//! The program as a person meets it: what it prints, what it leaves on disk, and how it exits.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+use npyz::NpyFile;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_spectroll");
+
+fn spectroll(folder: &Path, arguments: &str) -> Output {
+    Command::new(PROGRAM).args(arguments.split_whitespace()).current_dir(folder).output().unwrap()
+}
+
+/// Standard output and error of a run that succeeds.
+fn succeeds(folder: &Path, arguments: &str) -> (String, String) {
+    let output = spectroll(folder, arguments);
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    let (out, err) = (text(output.stdout), text(output.stderr));
+    assert!(output.status.success(), "{arguments}: {err}");
+    (out, err)
+}
+
+/// A run that fails with this exit code and says this, and leaves no new file.
+fn fails(folder: &Path, arguments: &str, code: i32, message: &str) {
+    let before = files(folder);
+    let output = spectroll(folder, arguments);
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments}: {err}");
+    assert!(err.contains(message), "{arguments}: {err}");
+    assert!(!err.contains("panicked"), "{arguments}: {err}");
+    assert_eq!(files(folder), before, "{arguments} left something behind");
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+fn npy(path: &Path) -> (Vec<u64>, Vec<f32>) {
+    let bytes = fs::read(path).unwrap();
+    let file = NpyFile::new(bytes.as_slice()).unwrap();
+    (file.shape().to_vec(), file.into_vec().unwrap())
+}
+
+#[test]
+fn a_sample_is_the_same_from_every_engine_and_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name| folder.path().join(name);
+    let common = "sample munsell-vrhel -n 1000 --seed 3 --lrv 0.4";
+    succeeds(folder.path(), &format!("{common} --engine gpu -o gpu.npy"));
+    succeeds(folder.path(), &format!("{common} --engine cpu -o cpu.npy"));
+    succeeds(folder.path(), &format!("{common} --engine cpu -o cpu.csv"));
+    let (stdout, _) = succeeds(folder.path(), &format!("{common} --engine cpu -o -"));
+
+    let (shape, values) = npy(&path("cpu.npy"));
+    assert_eq!(shape, [1000, 31]);
+    assert_eq!(fs::read(path("gpu.npy")).unwrap(), fs::read(path("cpu.npy")).unwrap());
+    assert_eq!(fs::read_to_string(path("cpu.csv")).unwrap(), stdout);
+    let mut lines = stdout.lines();
+    assert!(lines.next().unwrap().starts_with("400,410,420,"));
+    let text: Vec<f32> = lines.flat_map(|line| line.split(',').map(|v| v.parse().unwrap())).collect();
+    assert_eq!(text, values);
+
+    succeeds(folder.path(), "sample munsell-vrhel -n 400 --start 600 --seed 3 --lrv 0.4 -o part.npy");
+    assert_eq!(npy(&path("part.npy")).1, values[600 * 31..]);
+    assert_eq!(files(folder.path()), ["cpu.csv", "cpu.npy", "gpu.npy", "part.npy"]);
+}
+
+#[test]
+fn the_summary_says_what_was_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, summary) = succeeds(folder.path(), "sample munsell-vrhel -n 1e4 --lrv 0.6 -o a.npy");
+    for part in
+        ["10,000 spectra of 31 bands", "candidates (75.", "reach 1 or more after scaling", "million a second"]
+    {
+        assert!(summary.contains(part), "{summary}");
+    }
+    let (json, err) = succeeds(folder.path(), "sample granada -n 1_000 --json --engine cpu -o b.npy");
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((json["draws"].as_u64(), json["bands"].as_u64(), err.as_str()), (Some(1000), Some(31), ""));
+    let (out, err) = succeeds(folder.path(), "sample granada -n 10 -q -o c.npy");
+    assert_eq!((out, err), (String::new(), String::new()));
+}
+
+#[test]
+fn nothing_is_a_valid_file() {
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(folder.path(), "sample granada -n 0 -o zero.npy");
+    succeeds(folder.path(), "sample granada-5nm -n 0 -o zero.csv");
+    assert_eq!(npy(&folder.path().join("zero.npy")), (vec![0, 31], vec![]));
+    assert_eq!(fs::read_to_string(folder.path().join("zero.csv")).unwrap().lines().count(), 1);
+}
+
+#[test]
+fn impossible_and_hopeless_requests_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, code, message) in [
+        ("munsell-vrhel -n 5 --lrv 1.5", 2, "reflectance of 1.5: it must be above 0 and below 1"),
+        ("munsell-vrhel -n 5 --lrv -1", 2, "reflectance of -1"),
+        ("munsell-vrhel -n 5 --lrv NaN", 2, "reflectance of NaN"),
+        ("munsell-vrhel -n 5 --lrv 0.9999", 2, "the largest is 0.995928"),
+        ("munsell-vrhel -n 5 --lrv 0.99 --bounds scaled", 2, "none of 65536 was"),
+        ("munsell-vrhel -n 5 --cov-scale -2", 2, "scale of -2: it must be finite and not negative"),
+        ("munsell-vrhel -n 5 --cov-scale inf", 2, "scale of inf"),
+        ("munsell-vrhel -n 5 --cov-scale 100 --max-attempts 50", 2, "allow at least"),
+        ("munsell-vrhel -n 5 --max-attempts 0", 2, "at least 1 attempt"),
+        ("munsell-vrhel -n 5 --bounds scaled", 2, "--lrv"),
+        ("granada -n 5 --lrv 0.5", 2, "this model is of illuminants"),
+        ("granada -n 5 --start 18446744073709551615", 2, "pass the last"),
+        ("granada -n 18446744073709551615", 2, "more than any disk holds"),
+        ("granada -n -5", 2, "unexpected argument"),
+        ("granada -n 1.5", 2, "expected a whole number"),
+        ("munsel -n 5", 2, "neither a file nor a built-in model (munsell-vrhel, granada"),
+        ("granada -n 5 --adapter nonesuch", 3, "no adapter \"nonesuch\""),
+        ("granada -n 5 --adapter 99", 3, "no adapter \"99\""),
+    ] {
+        fails(folder.path(), &format!("sample {arguments} -o x.npy"), code, message);
+    }
+}
+
+#[test]
+fn what_is_in_the_way_of_a_file_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("old.npy"), "mine").unwrap();
+    fs::create_dir(folder.path().join("folder.npy")).unwrap();
+    fails(folder.path(), "sample granada -n 5 -o old.npy", 1, "exists already");
+    fails(folder.path(), "sample granada -n 5 -o folder.npy", 1, "is a folder");
+    fails(folder.path(), "sample granada -n 5 -o no/such/x.npy", 1, "create it first");
+    fails(folder.path(), "sample granada -n 5 -o x.xlsx", 1, "name it .npy or .csv");
+    fails(folder.path(), "sample granada -n 5 -o - --json", 2, "both write to standard output");
+    fails(folder.path(), "sample granada -n 5 --force --format npy -o /dev/null", 1, "not a plain file");
+    assert_eq!(fs::read_to_string(folder.path().join("old.npy")).unwrap(), "mine");
+    succeeds(folder.path(), "sample granada -n 5 -o old.npy --force");
+    assert_eq!(npy(&folder.path().join("old.npy")).0, [5, 31]);
+}
+
+#[test]
+fn a_model_is_fitted_and_drawn_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, err) = succeeds(folder.path(), "fit munsell vrhel -k 4 --wavelengths 410:20:690 -o m.json");
+    assert!(err.contains("4 components explain 9") && err.contains("632 reflectances"), "{err}");
+    succeeds(folder.path(), "sample m.json -n 20 -o m.npy");
+    assert_eq!(npy(&folder.path().join("m.npy")).0, [20, 15]);
+    let csv: String = (0..40).map(|i| format!("{},{},{},{}\n", 400 + i, 1 + i % 3, 2, 5 - i % 4)).collect();
+    fs::write(folder.path().join("lamps.csv"), csv).unwrap();
+    succeeds(folder.path(), "fit lamps.csv --kind illuminant -k 2 --wavelengths 400:1:439 -o lamps.json");
+
+    for (arguments, code, message) in [
+        ("fit lamps.csv -o x.json", 2, "pass --kind reflectance or --kind illuminant"),
+        ("fit lamps.csv --kind illuminant -k 3 -o x.json", 4, "which does not cover the grid 400:10:700"),
+        ("fit lamps.csv --kind illuminant -k 3 --wavelengths 400:1:439 -o x.json", 4, "at least 4 spectra"),
+        ("fit lamps.csv --kind illuminant -k 0 --wavelengths 400:1:439 -o x.json", 4, "at least 1 component"),
+        ("fit munsell --wavelengths 380:10:700 -o x.json", 4, "from 400 to 700 nm"),
+        ("fit munsell --wavelengths 400:7:700 -o x.json", 2, "whole number of steps"),
+        ("fit absent.mat -o x.json", 4, "cannot read \"absent.mat\""),
+        ("fit m.json -o x.json", 4, "unknown type of file"),
+        ("fit munsell -o m.json", 1, "exists already"),
+        ("sample lamps.csv -n 5 -o x.npy", 4, "is not a model file"),
+    ] {
+        fails(folder.path(), arguments, code, message);
+    }
+}
+
+/// Ctrl-C in the middle of a large file: exit code 130, soon, and nothing left behind.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for engine in ["gpu", "cpu"] {
+        let arguments = ["sample", "munsell-vrhel", "-n", "1e9", "-o", "big.npy", "--engine", engine];
+        let mut child = Command::new(PROGRAM).args(arguments).current_dir(folder.path()).spawn().unwrap();
+        let start = Instant::now();
+        while files(folder.path()).is_empty() {
+            assert!(start.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert!(files(folder.path()).is_empty());
+    }
+}
+
+#[test]
+fn help_ends_with_examples_that_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let (help, _) = succeeds(folder.path(), "--help");
+    let examples: Vec<_> = help.lines().filter_map(|line| line.strip_prefix("  spectroll ")).collect();
+    assert!(examples.len() >= 5);
+    for example in examples {
+        // The numbers are made smaller, and a redirection is the shell's.
+        let example = example.replace("1000000", "1000").split('>').next().unwrap().to_owned();
+        succeeds(folder.path(), &example);
+    }
+}
+
+#[test]
+fn adapters_and_bench_speak_both_languages() {
+    let folder = tempfile::tempdir().unwrap();
+    let (text, _) = succeeds(folder.path(), "adapters");
+    assert!(text.contains("0: ") && text.contains("CPU"), "{text}");
+    let (json, _) = succeeds(folder.path(), "adapters --json");
+    assert!(serde_json::from_str::<serde_json::Value>(&json).unwrap()[0]["name"].is_string());
+    let (json, _) = succeeds(folder.path(), "bench granada --engine cpu --runs 5 --json");
+    assert!(serde_json::from_str::<serde_json::Value>(&json).unwrap()[0]["median"].as_f64().unwrap() > 0.0);
+}

@@ -1,0 +1,86 @@
+//! The draws in f32, which every engine makes, against those in f64 of the same random words.
+//!
+//! Rounding can turn a candidate that lies within it of a bound from rejected to accepted or back: such flips are
+//! counted. It is stated in src/normal.rs that the f64 arithmetic shares nothing with that in f32.
+
+use rayon::prelude::*;
+use spectroll::{Bounds, Model, Real, Recipe, RecipeBuilder, Stream};
+
+/// Draws of each recipe.
+const DRAWS: u64 = 100_000;
+
+/// The most draws that may take another candidate, of all 600,000. A candidate flips where a bound lies within some
+/// 10^-7 of one of its values, so fewer than one in 10^6 is expected to.
+const FLIPS: usize = 2;
+
+/// The largest error of a value, relative to the factor that scaled it: 5 to 10 roundings of numbers near 1, and
+/// normals that are off by up to 4e-7.
+const ERROR: f64 = 1e-6;
+
+fn recipes() -> Vec<(&'static str, Recipe)> {
+    let reflectances = Model::builtin("munsell-vrhel").expect("it is built in");
+    let daylights = Model::builtin("granada").expect("it is built in");
+    let recipe = |name, builder: RecipeBuilder| (name, builder.build().expect("the recipe can be drawn"));
+    vec![
+        recipe("reflectances", Recipe::new(&reflectances)),
+        recipe("covariance x 4", Recipe::new(&reflectances).covariance_scale(4.0)),
+        recipe("LRV 0.6, base", Recipe::new(&reflectances).lrv(0.6)),
+        recipe("LRV 0.6, scaled", Recipe::new(&reflectances).lrv(0.6).bounds(Bounds::Scaled)),
+        recipe("LRV 0.2, both", Recipe::new(&reflectances).lrv(0.2).bounds(Bounds::Both)),
+        recipe("illuminants", Recipe::new(&daylights)),
+    ]
+}
+
+/// How a draw in f32 differs from the one in f64.
+enum Difference {
+    /// It took another candidate.
+    Flip,
+    /// The largest error of a value, and the largest of the spectrum's values.
+    Error(f64, f64),
+}
+
+fn difference(recipe: &Recipe, stream: Stream, index: u64) -> Difference {
+    let ((ours, our_tally), (exact, tally)) =
+        (recipe.draw::<f32>(stream, index), recipe.draw::<f64>(stream, index));
+    if our_tally.attempts() != tally.attempts() {
+        return Difference::Flip;
+    }
+    let errors = ours.iter().zip(&exact).map(|(&a, b)| (f64::from(a) - b).abs());
+    Difference::Error(errors.fold(0.0, f64::max), exact.iter().copied().fold(0.0, f64::max))
+}
+
+#[test]
+fn f32_takes_the_candidates_of_f64_and_keeps_their_values() {
+    let mut all_flips = 0;
+    for (name, recipe) in recipes() {
+        let stream = Stream::named(20, name);
+        let differences: Vec<_> =
+            (0..DRAWS).into_par_iter().map(|index| difference(&recipe, stream, index)).collect();
+        let flips = differences.iter().filter(|d| matches!(d, Difference::Flip)).count();
+        let errors = differences.iter().filter_map(|d| match *d {
+            Difference::Flip => None,
+            Difference::Error(error, largest) => Some((error, error / largest.max(1.0))),
+        });
+        let (absolute, relative) = errors.fold((0f64, 0f64), |(a, r), (e, f)| (a.max(e), r.max(f)));
+        println!(
+            "{name}: {flips} flips in {DRAWS} draws; largest error {absolute:.1e}, {relative:.1e} of the peak"
+        );
+        assert!(relative < ERROR, "{name}: an error of {relative:e}");
+        all_flips += flips;
+    }
+    assert!(all_flips <= FLIPS, "{all_flips} flips");
+}
+
+/// That the bound on errors means something: uniforms cut to 24 bits, as some generators of f32 have them, exceed it
+/// a thousandfold.
+#[test]
+fn uniforms_of_24_bits_would_not_pass() {
+    let error = |index| {
+        let [x, y, ..] = Stream::new(21).block(index, 0, 0);
+        let (cut, exact) = (f32::normal_pair(x & !0xFF, y & !0xFF), f64::normal_pair(x, y));
+        (0..2).map(|i| (f64::from(cut[i]) - exact[i]).abs()).fold(0.0, f64::max)
+    };
+    let largest = (0..DRAWS).into_par_iter().map(error).reduce(|| 0.0, f64::max);
+    println!("normals of 24-bit uniforms: largest error {largest:.1e}");
+    assert!(largest > 100.0 * ERROR, "{largest:e}");
+}

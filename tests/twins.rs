@@ -1,0 +1,291 @@
+//! Twins: the CPU engine in f32 and the shader make the same draws.
+//!
+//! A software adapter does not fuse multiply and add, so there every bit is demanded. A real GPU may fuse, which moves
+//! last digits: there a draw may take another candidate once in 10^6, and values may differ by 16 units in the last
+//! place of the largest term that made them. `WGPU_ADAPTER_NAME` picks the adapter; without one these tests fail.
+
+use std::sync::OnceLock;
+
+use nalgebra::{DMatrix, DVector};
+use rand::Rng;
+use spectroll::{
+    Bounds, Builtin, Choice, Dataset, Draws, Engine, EngineError, Extend, Fit, Grid, Kind, Model, Real,
+    Recipe, Stream, Tally, colorimetry,
+};
+
+#[path = "statistics/tinted.rs"]
+mod tinted;
+use tinted::tinted;
+
+/// How far an adapter that fuses may be off, in units in the last place of the largest term.
+const ULPS: f64 = 16.0;
+
+fn gpu() -> &'static Engine {
+    static GPU: OnceLock<Engine> = OnceLock::new();
+    GPU.get_or_init(|| Engine::new(&Choice::Gpu).unwrap_or_else(|e| panic!("twins need an adapter: {e}")))
+}
+
+fn cpu() -> Engine {
+    Engine::new(&Choice::Cpu).expect("the CPU is always there")
+}
+
+/// A recipe, and what it was made of.
+struct Case {
+    recipe: Recipe,
+    target: Option<(f64, Bounds)>,
+    /// The spectrum at z = 0, and what each normal adds.
+    offset: DVector<f64>,
+    gain: DMatrix<f64>,
+}
+
+impl Case {
+    fn new(model: &Model, target: Option<(f64, Bounds)>, scale: f64) -> Case {
+        let recipe = Recipe::new(model).covariance_scale(scale);
+        let recipe = match target {
+            Some((lrv, bounds)) => recipe.lrv(lrv).bounds(bounds),
+            None => recipe,
+        };
+        let parts = model.parts();
+        Case {
+            recipe: recipe.build().expect("the recipe can be drawn"),
+            target,
+            offset: model.reconstruct(parts.weight_mean.as_slice()),
+            gain: parts.basis.transpose() * model.weight_factor() * scale.sqrt(),
+        }
+    }
+
+    fn plain(model: &Model) -> Case {
+        Case::new(model, None, 1.0)
+    }
+
+    /// The unit in the last place of the largest term in candidate `attempts` of a draw.
+    fn ulp(&self, stream: Stream, index: u64, attempts: u32) -> f64 {
+        let blocks = (0..self.gain.ncols().div_ceil(4) as u32).map(|b| stream.block(index, attempts - 1, b));
+        let normals =
+            blocks.flat_map(|[a, b, c, d]| [f64::normal_pair(a, b), f64::normal_pair(c, d)].concat());
+        let z = DVector::from_iterator(self.gain.ncols(), normals.take(self.gain.ncols()));
+        let largest = (self.offset.abs() + self.gain.abs() * z.abs()).max();
+        let factor =
+            self.target.map_or(1.0, |(lrv, _)| lrv / self.lrv((&self.offset + &self.gain * z).as_slice()));
+        f64::from(f32::EPSILON) * largest * factor
+    }
+
+    fn lrv(&self, spectrum: &[f64]) -> f64 {
+        let weights = colorimetry::lrv_weights(self.recipe.model().grid()).expect("the grid is visible");
+        weights.iter().zip(spectrum).map(|(w, s)| w * s).sum()
+    }
+}
+
+#[derive(Clone, PartialEq)]
+struct Rows {
+    spectra: Vec<f32>,
+    tallies: Vec<Tally>,
+}
+
+fn rows(engine: &Engine, recipe: &Recipe, draws: Draws) -> Rows {
+    let mut rows = Rows { spectra: Vec::new(), tallies: Vec::new() };
+    let made = engine.draw(recipe, draws, |batch| {
+        rows.spectra.extend_from_slice(batch.spectra);
+        rows.tallies.extend_from_slice(batch.tallies);
+        Ok::<_, EngineError>(())
+    });
+    let summary = made.unwrap_or_else(|e| panic!("{engine}: {e}"));
+    assert_eq!((summary.draws, rows.tallies.len() as u64), (draws.count, draws.count));
+    rows
+}
+
+/// Whether two engines agree as they should: to the bit, or as arithmetic that fuses may.
+fn compare(case: &Case, draws: Draws, a: &Rows, b: &Rows, to_the_bit: bool) -> Result<(), String> {
+    let bands = case.recipe.model().bands();
+    let mut flips = 0;
+    for (i, (ta, tb)) in a.tallies.iter().zip(&b.tallies).enumerate() {
+        let index = draws.first.wrapping_add(i as u64);
+        if to_the_bit && ta != tb {
+            return Err(format!("draw {index}: {ta:?} against {tb:?}"));
+        }
+        if ta.attempts() != tb.attempts() {
+            flips += 1;
+            continue;
+        }
+        let row = |rows: &Rows| rows.spectra[i * bands..(i + 1) * bands].to_vec();
+        let tolerance = if to_the_bit { 0.0 } else { ULPS * case.ulp(draws.stream, index, ta.attempts()) };
+        for (band, (x, y)) in row(a).into_iter().zip(row(b)).enumerate() {
+            if x.to_bits() != y.to_bits() && !(f64::from(x - y).abs() <= tolerance) {
+                return Err(format!("draw {index}, band {band}: {x:e} against {y:e}"));
+            }
+        }
+    }
+    let allowed = if to_the_bit { 0 } else { 1 + draws.count / 1_000_000 };
+    if flips > allowed {
+        return Err(format!("{flips} of {} draws took another candidate", draws.count));
+    }
+    Ok(())
+}
+
+/// What holds of the draws of every engine: they are physical, and have the LRV that they should.
+fn assert_valid(case: &Case, rows: &Rows) {
+    let model = case.recipe.model();
+    let below_one = model.kind() == Kind::Reflectance && !matches!(case.target, Some((_, Bounds::Base)));
+    for (row, tally) in rows.spectra.chunks_exact(model.bands()).zip(&rows.tallies) {
+        assert!(row.iter().all(|&s| s > 0.0 && s.is_finite() && !(below_one && s >= 1.0)), "{row:?}");
+        let above_one = model.kind() == Kind::Reflectance && row.iter().any(|&s| s >= 1.0);
+        assert_eq!(tally.above_one(), above_one, "{row:?}");
+        if let Some((lrv, _)) = case.target {
+            let found = case.lrv(&row.iter().map(|&s| f64::from(s)).collect::<Vec<_>>());
+            assert!((found - lrv).abs() < 2e-6, "an LRV of {found} where {lrv} was asked for");
+        }
+    }
+}
+
+/// Makes `draws` on both engines, holds them against each other and against `Recipe::draw`, and returns the CPU's.
+fn assert_twins(case: &Case, draws: Draws) -> Rows {
+    let (ours, theirs) = (rows(&cpu(), &case.recipe, draws), rows(gpu(), &case.recipe, draws));
+    let adapter = gpu().adapter().expect("it draws on an adapter");
+    if let Err(difference) = compare(case, draws, &ours, &theirs, adapter.kind == "software") {
+        panic!("CPU against {adapter}: {difference}");
+    }
+    assert_valid(case, &ours);
+    assert_valid(case, &theirs);
+    let bands = case.recipe.model().bands();
+    for i in (0..ours.tallies.len()).step_by(draws.count.div_ceil(5000).max(1) as usize) {
+        let (row, tally) = case.recipe.draw::<f32>(draws.stream, draws.first.wrapping_add(i as u64));
+        assert_eq!((row.as_slice(), tally), (&ours.spectra[i * bands..(i + 1) * bands], ours.tallies[i]));
+    }
+    ours
+}
+
+fn builtin(name: &str) -> Model {
+    Model::builtin(name).expect("it is built in")
+}
+
+fn reflectances(tables: &[Builtin], grid: &str, components: usize) -> Model {
+    let tables: Vec<_> = tables.iter().map(|t| t.table()).collect();
+    let grid = grid.parse::<Grid>().expect("a grid");
+    let data = Dataset::new(&tables, grid, Extend::Error).expect("the tables cover the grid");
+    Fit::new(Kind::Reflectance).components(components).fit(&data).expect("the data have that rank")
+}
+
+const ALL_BOUNDS: [Bounds; 3] = [Bounds::Base, Bounds::Scaled, Bounds::Both];
+
+#[test]
+fn several_windows_of_both_kinds() {
+    for name in ["munsell-vrhel", "granada"] {
+        assert_twins(&Case::plain(&builtin(name)), Stream::new(1).draws(0..200_003));
+    }
+}
+
+#[test]
+fn every_rule_at_a_target_lrv() {
+    for (lrv, bounds) in [0.2, 0.6].into_iter().flat_map(|lrv| ALL_BOUNDS.map(|bounds| (lrv, bounds))) {
+        let case = Case::new(&builtin("munsell-vrhel"), Some((lrv, bounds)), 1.0);
+        let rows = assert_twins(&case, Stream::new(2).draws(0..20_001));
+        let above_one = rows.tallies.iter().filter(|t| t.above_one()).count();
+        println!("LRV {lrv} {bounds:?}: {above_one} of 20,001 reach 1 somewhere");
+        assert_eq!(
+            above_one > 0,
+            bounds == Bounds::Base && lrv == 0.6 || above_one > 0 && bounds == Bounds::Base
+        );
+    }
+}
+
+#[test]
+fn covariances_scaled_and_full() {
+    for scale in [4.0, 0.01] {
+        assert_twins(&Case::new(&builtin("munsell-vrhel"), None, scale), Stream::new(3).draws(0..20_001));
+    }
+    assert_twins(&Case::plain(&tinted()), Stream::new(3).draws(0..20_001));
+    assert_twins(&Case::new(&tinted(), Some((0.4, Bounds::Both)), 2.0), Stream::new(3).draws(0..20_001));
+}
+
+#[test]
+fn any_number_of_components() {
+    for components in [1, 2, 3, 5, 12, 31] {
+        let model = reflectances(&[Builtin::Munsell, Builtin::Vrhel], "400:10:700", components);
+        assert_twins(&Case::plain(&model), Stream::new(4).draws(0..4097));
+    }
+}
+
+/// 341 bands: up to 6 components are written out in straight lines, 7 and more run in loops.
+#[test]
+fn models_too_large_for_straight_lines() {
+    let of = |components| reflectances(&[Builtin::Vrhel], "390:1:730", components);
+    let draws = Stream::named(5, "wall").draws(77..77 + 4097);
+    assert_twins(&Case::plain(&of(6)), draws);
+    assert_twins(&Case::plain(&of(7)), draws);
+    let twelve = of(12);
+    assert_twins(&Case::plain(&twelve), draws);
+    for bounds in ALL_BOUNDS {
+        assert_twins(&Case::new(&twelve, Some((0.6, bounds)), 1.0), draws);
+    }
+}
+
+#[test]
+fn any_count() {
+    let (base, illuminant) = (
+        Case::new(&builtin("munsell-vrhel"), Some((0.6, Bounds::Base)), 1.0),
+        Case::plain(&builtin("granada")),
+    );
+    for count in [0, 1, 63, 64, 65, 4097] {
+        for case in [&base, &illuminant] {
+            assert_twins(case, Stream::new(6).draws(3..3 + count));
+        }
+    }
+}
+
+/// The second half of these indices needs the counter's high word; the last ones go round to 0.
+#[test]
+fn any_index_seed_and_stream() {
+    let case = Case::plain(&builtin("munsell-vrhel"));
+    for seed in [0, u64::MAX, 0x0123_4567_89AB_CDEF] {
+        for stream in [Stream::new(seed), Stream::named(seed, "table lamp")] {
+            assert_twins(&case, stream.draws((1 << 32) - 33..(1 << 32) + 32));
+            assert_twins(&case, stream.draws(u64::MAX - 70..=u64::MAX));
+        }
+    }
+    let stream = Stream::new(7);
+    let around = assert_twins(&case, Draws { stream, first: u64::MAX - 4, count: 11 });
+    let from_zero = rows(&cpu(), &case.recipe, stream.draws(0..6));
+    assert_eq!(around.spectra[5 * case.recipe.model().bands()..], from_zero.spectra);
+}
+
+#[test]
+fn any_split_gives_the_same_bytes() {
+    let case = Case::new(&builtin("munsell-vrhel"), Some((0.6, Bounds::Both)), 1.0);
+    let stream = Stream::named(8, "floor");
+    let (first, count) = ((1u64 << 32) - 5000, 10_007);
+    let whole = stream.draws(first..first + count);
+    let mut rng = Stream::new(9).rng();
+    for engine in [&cpu(), gpu()] {
+        let mut pieces = Rows { spectra: Vec::new(), tallies: Vec::new() };
+        let mut next = 0;
+        while next < count {
+            let piece = (1 + u64::from(rng.next_u32() % 3000)).min(count - next);
+            let rows = rows(engine, &case.recipe, stream.draws(first + next..first + next + piece));
+            pieces.spectra.extend(rows.spectra);
+            pieces.tallies.extend(rows.tallies);
+            next += piece;
+        }
+        assert!(rows(engine, &case.recipe, whole) == pieces, "{engine}: the pieces differ from the whole");
+    }
+}
+
+/// The tolerance for adapters that fuse, tried where none is at hand: the f64 oracle rounds elsewhere too, and
+/// must pass; a value that is off by a little more must not, nor must one draw in 1,000 that took another candidate.
+#[test]
+fn the_tolerance_for_hardware_is_neither_tight_nor_loose() {
+    let targets = [None, Some((0.6, Bounds::Base)), Some((0.2, Bounds::Scaled))];
+    for case in targets.map(|target| Case::new(&builtin("munsell-vrhel"), target, 1.0)) {
+        let draws = Stream::new(10).draws(0..20_000);
+        let ours = rows(&cpu(), &case.recipe, draws);
+        let (spectra, tallies): (Vec<_>, Vec<_>) =
+            (0..draws.count).map(|i| case.recipe.draw::<f64>(draws.stream, i)).unzip();
+        let oracle = Rows { spectra: spectra.concat().iter().map(|&s| s as f32).collect(), tallies };
+        assert_eq!(compare(&case, draws, &ours, &oracle, false), Ok(()));
+        let mut off = oracle.clone();
+        off.spectra[31] += (2.0 * ULPS * case.ulp(draws.stream, 1, off.tallies[1].attempts())) as f32;
+        assert!(compare(&case, draws, &ours, &off, false).is_err());
+        let mut flipped = oracle;
+        flipped.tallies.rotate_left(1);
+        assert!(compare(&case, draws, &ours, &flipped, false).is_err());
+    }
+}
