@@ -8,6 +8,7 @@
 //! The first word x is the uniform u = (x + 1/2) 2^-32 of the radius sqrt(-2 ln u), the second, y, the angle
 //! 2 pi (y + 1/2) 2^-32: neither end of either interval is ever reached.
 
+use std::f32::consts::LN_2;
 use std::f64::consts::{SQRT_2, TAU};
 use std::ops::{Add, Div, Mul};
 
@@ -94,7 +95,7 @@ pub(crate) fn radius(x: u32) -> f32 {
     let upper_e = if near_one { 0.0 } else { -1.0 };
     let t = if upper { upper_t } else { lower_t };
     let e = if upper { upper_e } else { lower_e };
-    (-2.0 * (e * 0.6931472 + log1p_reduced(t))).sqrt()
+    (-2.0 * (e * LN_2 + log1p_reduced(t))).sqrt()
 }
 
 /// The cosine and sine of a word. The quarter turn is integer arithmetic, which leaves an angle in [-pi/4, pi/4] for

@@ -240,3 +240,64 @@ impl<R: Real> Distribution<Vec<R>> for Recipe {
         spectrum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(recipe: RecipeBuilder) -> String {
+        recipe.build().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_says_why() {
+        let surface = Recipe::new(&Model::builtin("munsell-vrhel").unwrap());
+        let light = Recipe::new(&Model::builtin("granada").unwrap());
+        for (recipe, part) in [
+            (surface.clone().lrv(f64::NAN), "NaN: it must be above 0 and below 1"),
+            (surface.clone().lrv(0.0), "reflectance of 0:"),
+            (surface.clone().lrv(0.996), "the largest is 0.995928"),
+            (surface.clone().covariance_scale(f64::NAN), "finite and not negative"),
+            (surface.clone().max_attempts(0), "at least 1 attempt"),
+            (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
+            (surface.clone().covariance_scale(1e6), "none of 65536 was"),
+            (surface.clone().covariance_scale(100.0).max_attempts(1000), "allow at least"),
+            (light.clone().lrv(0.5), "of illuminants"),
+        ] {
+            let text = message(recipe);
+            assert!(text.contains(part), "{text}");
+        }
+        // What the message advises is enough.
+        let advised = message(surface.clone().covariance_scale(100.0).max_attempts(1000));
+        let attempts =
+            advised.split("allow at least ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!(surface.covariance_scale(100.0).max_attempts(attempts).build().is_ok());
+    }
+
+    #[test]
+    fn a_model_without_room_names_its_wavelengths() {
+        let mut parts = Model::builtin("munsell-vrhel").unwrap().parts().clone();
+        parts.mean[3] = 9.0;
+        parts.mean[4] = -9.0;
+        let text = message(Recipe::new(&Model::new(parts).unwrap()));
+        assert!(text.contains("the bounds at 430 nm, 440 nm leave no room"), "{text}");
+    }
+
+    #[test]
+    fn values_beyond_f32_are_refused() {
+        let mut parts = Model::builtin("granada").unwrap().parts().clone();
+        parts.mean *= 1e35;
+        assert!(message(Recipe::new(&Model::new(parts).unwrap())).contains("beyond what f32 holds"));
+    }
+
+    /// Frozen, so that a changed stream is a decision and not an accident.
+    #[test]
+    fn the_first_draw_stays_what_it_is() {
+        let recipe = Recipe::new(&Model::builtin("munsell-vrhel").unwrap()).build().unwrap();
+        let (spectrum, tally) = recipe.draw::<f32>(Stream::new(1), 0);
+        let ends = [spectrum[0], spectrum[15], spectrum[30]].map(f32::to_bits);
+        assert_eq!((ends, tally.attempts(), tally.above_one()), (FIRST, 1, false));
+    }
+
+    const FIRST: [u32; 3] = [1050670988, 1051942847, 1058168784];
+}

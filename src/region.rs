@@ -113,3 +113,60 @@ fn distinct(mut bands: Vec<usize>) -> Vec<usize> {
     bands.dedup();
     bands
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::colorimetry::lrv_weights;
+    use crate::model::Model;
+    use crate::program::Target;
+
+    /// Reflectances of 3 bands that vary in one shape: 0.5 + 0.1 z, 0.5 + 0.2 z, 0.5 - 0.1 z.
+    fn ramp(target: Option<(f64, Bounds)>) -> Program {
+        Program {
+            kind: Kind::Reflectance,
+            offset: vec![0.5; 3],
+            gain: vec![vec![0.1, 0.2, -0.1]],
+            target: target.map(|(lrv, bounds)| Target { lrv, weights: vec![0.25, 0.5, 0.25], bounds }),
+            max_attempts: 1,
+        }
+    }
+
+    #[test]
+    fn room_and_no_room() {
+        assert_eq!(blocking_bands(&ramp(None)), None);
+        let above = Program { offset: vec![0.5, 1.5, 1.5], ..ramp(None) };
+        assert_eq!(blocking_bands(&above), Some(vec![1, 2]), "one needs z < -2.5, the other z > 5");
+        let constant = Program { offset: vec![0.5, -0.1, 0.5], gain: vec![vec![0.0; 3]], ..ramp(None) };
+        assert_eq!(blocking_bands(&constant), Some(vec![1]));
+        let touching =
+            Program { offset: vec![0.0, 0.5, 1.0], gain: vec![vec![-0.1, 0.0, 0.1]], ..ramp(None) };
+        assert_eq!(blocking_bands(&touching), None, "z < 0 is room");
+        let pinched = Program { offset: vec![0.0, 0.5, 1.0], gain: vec![vec![0.1, 0.0, 0.1]], ..ramp(None) };
+        assert_eq!(blocking_bands(&pinched), Some(vec![0, 2]), "z > 0 and z < 0");
+    }
+
+    /// By hand: t = s / max(s) is lightest where two bands tie at 1. At z = 0 all tie, so the largest LRV is 1.
+    #[test]
+    fn the_largest_lrv_of_a_ramp() {
+        let program = ramp(Some((0.9, Bounds::Scaled)));
+        let largest = |p: &Program| largest_lrv(p, &p.target.as_ref().unwrap().weights).unwrap();
+        assert!((largest(&program) - 1.0).abs() < 1e-6);
+        let tilted = Program { offset: vec![0.25, 0.5, 0.5], ..program };
+        let by_search = (-5000..5000)
+            .map(|i| i as f64 * 1e-3)
+            .map(|z| [0.25 + 0.1 * z, 0.5 + 0.2 * z, 0.5 - 0.1 * z])
+            .filter(|s| s.iter().all(|&v| v > 0.0))
+            .map(|s| (0.25 * s[0] + 0.5 * s[1] + 0.25 * s[2]) / s.iter().copied().fold(0.0, f64::max))
+            .fold(0.0, f64::max);
+        assert!((largest(&tilted) - by_search).abs() < 1e-3, "{} {by_search}", largest(&tilted));
+    }
+
+    #[test]
+    fn the_largest_lrv_of_munsell_and_vrhel() {
+        let model = Model::builtin("munsell-vrhel").unwrap();
+        let weights = lrv_weights(model.grid()).unwrap();
+        let largest = largest_lrv(&Program::new(&model, 1.0, None, 1), &weights).unwrap();
+        assert!((largest - 0.995928).abs() < 1e-6, "{largest}");
+    }
+}

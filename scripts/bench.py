@@ -1,0 +1,162 @@
+"""Spectroll beside NumPy and Numba, in one run on one machine.
+
+The programs take turns, so that all of them meet the machine's good and bad moments; medians are printed with their
+least and most. PEERS names a script of the same draws in NumPy and Numba (`peers.py MODEL.txt COUNT numpy|numba`);
+without it only Spectroll is measured.
+"""
+
+import argparse
+import json
+import os
+import platform
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+SPECTROLL = os.path.join(ROOT, "target", "release", "spectroll")
+PEERS = os.environ.get("PEERS", os.path.join(ROOT, "..", "shared", "peers", "peers.py"))
+MEMORY = "/dev/shm" if os.path.isdir("/dev/shm") else tempfile.gettempdir()
+
+# What a NumPy user would write to fill a file: the same draws as `peers.py numpy`, into a memory-mapped .npy.
+NUMPY_FILE = """
+import sys, numpy as np
+m = np.loadtxt(sys.argv[1]).astype(np.float32); mu = m[:31]; B = m[31:217].reshape(6, 31) * m[217:223][:, None]
+n = int(sys.argv[2]); g = np.random.Generator(np.random.SFC64(1)); k = 0
+out = np.lib.format.open_memmap(sys.argv[3], 'w+', np.float32, (n, 31))
+while k < n:
+    r = g.standard_normal((1 << 18, 6), dtype=np.float32) @ B + mu
+    r = r[((r > 0) & (r < 1)).all(1)]; t = min(len(r), n - k); out[k:k + t] = r[:t]; k += t
+out.flush()
+"""
+
+
+def run(*command, env=None):
+    """Standard output, seconds and peak resident megabytes of a command that must succeed."""
+    start = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, env={**os.environ, **(env or {})})
+    out = process.stdout.read().decode()
+    _, status, usage = os.wait4(process.pid, 0)
+    if status:
+        sys.exit(f"{' '.join(command)} failed")
+    return out, time.perf_counter() - start, usage.ru_maxrss / 1024
+
+
+class Figures:
+    """Samples by name, in the order in which the names came."""
+
+    def __init__(self):
+        self.samples = {}
+
+    def add(self, name, value):
+        self.samples.setdefault(name, []).append(value)
+
+    def median(self, name):
+        return statistics.median(self.samples[name])
+
+    def show(self, unit):
+        for name, values in self.samples.items():
+            low, high = min(values), max(values)
+            print(f"  {self.median(name):10.3f} {unit}  ({low:.3f} to {high:.3f}, n = {len(values)})  {name}")
+
+    def ratio(self, a, b):
+        pairs = [x / y for x, y in zip(self.samples[a], self.samples[b])]
+        print(f"  {statistics.median(pairs):10.2f} x  ({min(pairs):.2f} to {max(pairs):.2f})  {a} / {b}")
+
+
+def peers_model(folder):
+    """The built-in model as `peers.py` reads it: mean, basis, standard deviations."""
+    path = os.path.join(folder, "model.json")
+    run(SPECTROLL, "fit", "munsell", "vrhel", "-o", path)
+    with open(path) as file:
+        model = json.load(file)
+    deviations = [row[i] ** 0.5 for i, row in enumerate(model["weight_covariance"])]
+    numbers = model["mean"] + sum(model["basis"], []) + deviations
+    text = os.path.join(folder, "model.txt")
+    with open(text, "w") as file:
+        file.write("\n".join(map(repr, numbers)))
+    return text
+
+
+def in_process(rounds, model):
+    rates = Figures()
+    for _ in range(rounds):
+        for rate in json.loads(run(SPECTROLL, "bench", "--json", "--runs", "5")[0]):
+            rates.add(rate["engine"], rate["median"])
+        if model:
+            for peer in ("numpy", "numba"):
+                out = run(sys.executable, PEERS, model, "4e6", peer)[0]
+                rates.add(peer, float(re.search(r"([\d.]+) M accepted/s", out)[1]))
+    print("In process, reflectances of 31 bands and 6 components, mapped for reading:")
+    rates.show("million/s")
+    if model:
+        for engine in [name for name in rates.samples if name not in ("numpy", "numba")]:
+            for peer in ("numpy", "numba"):
+                rates.ratio(engine, peer)
+
+
+def whole_process(rounds, model, count):
+    seconds, memory = Figures(), Figures()
+    out = os.path.join(MEMORY, f"spectroll-bench-{os.getpid()}.npy")
+    size = count * 31 * 4
+    commands = {
+        "spectroll --engine auto": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force"],
+        "spectroll --engine cpu": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force", "--engine", "cpu"],
+        "dd": ["dd", "if=/dev/zero", f"of={out}", "bs=4M", f"count={size >> 22}", "status=none"],
+    }
+    if model:
+        commands["numpy"] = [sys.executable, "-c", NUMPY_FILE, model, str(count), out]
+    try:
+        for _ in range(rounds):
+            for name, command in commands.items():
+                _, taken, resident = run(*command)
+                seconds.add(name, taken)
+                memory.add(name, resident)
+                os.remove(out)
+    finally:
+        if os.path.exists(out):
+            os.remove(out)
+    print(f"\nWhole process, {count:,} reflectances ({size / 1e9:.2f} GB) into a .npy file in {MEMORY}:")
+    seconds.show("s")
+    for name in ("numpy", "dd"):
+        if name in seconds.samples:
+            seconds.ratio(name, "spectroll --engine auto")
+    print("  peak resident memory:")
+    memory.show("MB")
+
+
+def latency(rounds, folder):
+    seconds = Figures()
+    out = os.path.join(folder, "one.npy")
+    for _ in range(rounds):
+        cache = tempfile.mkdtemp(dir=folder)  # so that no shader is compiled already
+        one = [SPECTROLL, "sample", "munsell-vrhel", "-n", "1", "-o", out, "-q", "--force"]
+        seconds.add("first draw, no shader cached", run(*one, env={"MESA_SHADER_CACHE_DIR": cache})[1])
+        seconds.add("first draw, shader cached", run(*one, env={"MESA_SHADER_CACHE_DIR": cache})[1])
+        seconds.add("first draw, --engine cpu", run(*one, "--engine", "cpu")[1])
+        fit = [SPECTROLL, "fit", "munsell", "vrhel", "-o", os.path.join(folder, "m.json"), "--force"]
+        seconds.add("fit of 632 reflectances", run(*fit)[1])
+        shutil.rmtree(cache)
+    print("\nWhole process, from the start of the program to its end:")
+    seconds.show("s")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=5, help="how often each program takes its turn")
+    parser.add_argument("--count", type=int, default=8_000_000, help="spectra of a whole-process run")
+    arguments = parser.parse_args()
+    print(f"{time.strftime('%Y-%m-%d')}, {os.cpu_count()} cores, {platform.machine()}, {platform.system()}\n")
+    with tempfile.TemporaryDirectory() as folder:
+        model = peers_model(folder) if os.path.exists(PEERS) else None
+        in_process(arguments.rounds, model)
+        whole_process(arguments.rounds, model, arguments.count)
+        latency(arguments.rounds, folder)
+
+
+if __name__ == "__main__":
+    main()
