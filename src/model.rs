@@ -1,9 +1,7 @@
-//! A fitted model: a Gaussian over the weights of a few basis spectra.
+//! A fitted model, its file format, and the models that are built in.
 //!
-//! A spectrum is mean + sum over components of weight x basis vector, and the weights are normal with a mean and a
-//! covariance (Singh et al. 2018, appendix, eq. 2-8). A model is checked when it is made, whether by a fit, from a
-//! file or by hand, so what holds one may rely on its shapes, on an orthonormal basis and on a covariance that has a
-//! square root.
+//! A model is checked when it is made, whether by a fit, from a file or by hand, so what holds one may rely on its
+//! shapes, on an orthonormal basis and on a covariance that has a square root.
 
 use std::fs;
 use std::path::Path;
@@ -33,7 +31,8 @@ pub enum Normalization {
     None,
 }
 
-/// A Gaussian model of spectra. See the [module](self).
+/// A Gaussian model of spectra: a spectrum is mean + sum over components of weight x basis vector, and the weights are
+/// normal with a mean and a covariance (Singh et al. 2018, appendix, eq. 2-8).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     parts: Parts,

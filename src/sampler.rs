@@ -1,8 +1,5 @@
-//! The compute shader of a recipe on a wgpu device, recorded into its host's command encoders.
-//!
-//! A sampler is a guest: it makes pipelines and buffers on the host's device, and never submits, polls or asks for a
-//! device of its own. It needs no feature and no more than the default limits; where the device was created with
-//! `SHADER_INT64` it multiplies in 64 bits.
+//! The compute shader of a recipe on a wgpu device, recorded into its host's command encoders. No code here submits,
+//! polls or asks for a device.
 
 use bytemuck::{Pod, Zeroable};
 use wgpu::{BufferUsages, Device};
@@ -17,7 +14,11 @@ const SPECTRA: u32 = 1;
 const TALLIES: u32 = 2;
 const MODEL: u32 = 3;
 
-/// A recipe's pipeline on one device. See the [module](self).
+/// A recipe's compute pipeline on a wgpu device, to be recorded into its host's command encoders.
+///
+/// A sampler is a guest: it makes pipelines and buffers on the host's device, and never submits, polls or asks for a
+/// device of its own. It needs no feature and no more than the default limits; where the device was created with
+/// `SHADER_INT64` it multiplies in 64 bits.
 ///
 /// ```
 /// use spectroll::{Model, Recipe, Sampler, Stream, wgpu};

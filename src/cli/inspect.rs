@@ -1,7 +1,193 @@
-#[derive(clap::Args)]
+//! `spectroll inspect`: what a model is, as a table and, where asked, as a picture.
+//!
+//! A fit is judged by how much it explains, by how its weights spread and by how many of its draws are physical, so
+//! that is what the table holds. The picture is made first: a name that cannot be written is reported before anything
+//! is printed.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use spectroll::output::Existing;
+use spectroll::{Model, Normalization, Recipe, RecipeError};
+
+use super::picture;
+
+/// Show what a model is: a table, and a picture where asked
+#[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    model: String,
+    /// The model: a file, or the name of a built-in one
+    #[arg(value_name = "MODEL")]
+    pub(crate) model: String,
+
+    /// Draw the model into this file, .svg or .png
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) output: Option<PathBuf>,
+
+    /// The seed of the draws in the picture
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
+
+    /// Replace the picture where it exists
+    #[arg(long)]
+    pub(crate) force: bool,
 }
-pub(crate) fn run(_: &Arguments) -> anyhow::Result<()> {
+
+/// Prints the table, after making the picture where one is asked for.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let format = arguments.output.as_deref().map(picture::Format::of).transpose()?;
+    let model = super::model(&arguments.model)?;
+    let recipe = Recipe::new(&model).build();
+    if let (Some(path), Some(format)) = (&arguments.output, format) {
+        let existing = if arguments.force { Existing::Replace } else { Existing::Keep };
+        let figure = picture::Picture { model: &model, recipe: recipe.as_ref().ok(), seed: arguments.seed };
+        figure.write(path, format, existing)?;
+    }
+    let table = table(&arguments.model, &model, &recipe);
+    std::io::stdout().lock().write_all(table.as_bytes())?;
     Ok(())
+}
+
+/// Everything that is printed.
+fn table(name: &str, model: &Model, recipe: &Result<Recipe, RecipeError>) -> String {
+    let grid = model.grid();
+    let mut text = String::new();
+    line(&mut text, "model", name);
+    line(&mut text, "kind", &model.kind().to_string());
+    line(&mut text, "grid", &format!("{grid} nm"));
+    line(&mut text, "bands", &model.bands().to_string());
+    line(&mut text, "components", &model.components().to_string());
+    line(&mut text, "normalization", normalization(model.parts().normalization));
+    for (index, source) in model.parts().sources.iter().enumerate() {
+        line(&mut text, if index == 0 { "sources" } else { "" }, source);
+    }
+    line(&mut text, "acceptance", &acceptance(recipe));
+    text.push('\n');
+    components(&mut text, model);
+    text
+}
+
+fn line(text: &mut String, label: &str, value: &str) {
+    const LABEL: usize = 15;
+    let mut label = label;
+    for part in wrapped(value, 80 - LABEL) {
+        let _ = writeln!(text, "{label:<LABEL$}{part}");
+        label = "";
+    }
+}
+
+/// The words of `text` in lines of at most `width` characters, where no word is longer.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    let mut used = 0;
+    for word in text.split_whitespace() {
+        let length = word.chars().count();
+        if used > 0 && used + 1 + length > width {
+            lines.push(String::new());
+            used = 0;
+        }
+        let last = lines.len() - 1;
+        if used > 0 {
+            lines[last].push(' ');
+            used += 1;
+        }
+        lines[last].push_str(word);
+        used += length;
+    }
+    lines
+}
+
+fn normalization(normalization: Normalization) -> &'static str {
+    match normalization {
+        Normalization::Mean => "each spectrum divided by its mean power",
+        Normalization::Integral => "each spectrum divided by its integral over the grid",
+        Normalization::None => "none",
+    }
+}
+
+fn acceptance(recipe: &Result<Recipe, RecipeError>) -> String {
+    match recipe {
+        Ok(recipe) => format!("{:.2} % of plain draws are physical (estimated)", 100.0 * recipe.acceptance()),
+        Err(e) => format!("plain draws are refused: {e}"),
+    }
+}
+
+/// A row a component.
+fn components(text: &mut String, model: &Model) {
+    let parts = model.parts();
+    let deviation: Vec<f64> = parts.weight_covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect();
+    let weight = Notation::of(&deviation);
+    let _ = writeln!(
+        text,
+        "{:>9}{:>13}{:>12}{:>14}{:>14}{:>11}",
+        "component", "explained", "cumulated", "sd of weight", "mean weight", "peak"
+    );
+    let _ = writeln!(text, "{:>9}{:>13}{:>12}{:>14}{:>14}{:>11}", "", "%", "%", "", "", "nm");
+    let mut cumulated = 0.0;
+    for (index, explained) in parts.explained_variance.iter().enumerate() {
+        cumulated += explained;
+        let _ = writeln!(
+            text,
+            "{:>9}{:>13.3}{:>12.3}{:>14}{:>14}{:>11}",
+            index + 1,
+            100.0 * explained,
+            100.0 * cumulated,
+            weight.format(deviation[index]),
+            weight.format(parts.weight_mean[index]),
+            peak(model, index),
+        );
+    }
+}
+
+/// The wavelength where a basis vector is farthest from zero, in nm.
+fn peak(model: &Model, component: usize) -> f64 {
+    model.grid().wavelength(model.parts().basis.row(component).transpose().iamax())
+}
+
+/// How a column of numbers is written, so that its points align.
+#[derive(Clone, Copy)]
+enum Notation {
+    Fixed,
+    Scientific,
+}
+
+impl Notation {
+    /// Four decimals, where they show what the largest value is.
+    fn of(values: &[f64]) -> Notation {
+        let largest = values.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
+        if largest == 0.0 || (0.01..1e6).contains(&largest) { Notation::Fixed } else { Notation::Scientific }
+    }
+
+    fn format(self, value: f64) -> String {
+        match self {
+            // What rounds to zero loses its sign: a mean of -1e-17 is not "-0.0000".
+            Notation::Fixed if value.abs() < 0.5e-4 => format!("{:.4}", 0.0),
+            Notation::Fixed => format!("{value:.4}"),
+            Notation::Scientific => format!("{value:.3e}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_fits_80_columns_and_has_a_row_a_component() {
+        for name in Model::BUILTIN {
+            let model = Model::builtin(name).unwrap();
+            let table = table(name, &model, &Recipe::new(&model).build());
+            assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
+            let rows = table.lines().skip_while(|line| !line.starts_with("component ")).count();
+            assert_eq!(rows, 2 + model.components(), "{table}");
+            assert!(!table.contains("-0.0000"), "{table}");
+        }
+    }
+
+    #[test]
+    fn long_text_is_wrapped_between_words() {
+        assert_eq!(wrapped("a bc  def", 4), ["a bc", "def"]);
+        assert_eq!(wrapped("", 4), [""]);
+        assert_eq!(wrapped("abcdef", 4), ["abcdef"]);
+    }
 }

@@ -20,30 +20,39 @@ pub enum Builtin {
 }
 
 impl Builtin {
-    /// The table of that name: `munsell`, `vrhel`, `d65`, `xyz1931` or `cie-daylight`.
+    /// Every table.
+    pub const ALL: [Builtin; 5] =
+        [Builtin::Munsell, Builtin::Vrhel, Builtin::D65, Builtin::Xyz1931, Builtin::CieDaylight];
+
+    /// The table of that [name](Self::name).
     pub fn named(name: &str) -> Option<Builtin> {
-        Some(match name {
-            "munsell" => Builtin::Munsell,
-            "vrhel" => Builtin::Vrhel,
-            "d65" => Builtin::D65,
-            "xyz1931" => Builtin::Xyz1931,
-            "cie-daylight" => Builtin::CieDaylight,
-            _ => return None,
-        })
+        Builtin::ALL.into_iter().find(|builtin| builtin.name() == name)
+    }
+
+    /// What the table is called here.
+    pub fn name(self) -> &'static str {
+        match self {
+            Builtin::Munsell => "munsell",
+            Builtin::Vrhel => "vrhel",
+            Builtin::D65 => "d65",
+            Builtin::Xyz1931 => "xyz1931",
+            Builtin::CieDaylight => "cie-daylight",
+        }
     }
 
     /// The table itself, at its native sampling.
     pub fn table(self) -> Table {
-        let (name, bytes): (_, &[u8]) = match self {
+        let (variable, bytes): (_, &[u8]) = match self {
             Builtin::Munsell => ("sur_nickerson", include_bytes!("../../data/sur_nickerson.mat")),
             Builtin::Vrhel => ("sur_vrhel", include_bytes!("../../data/sur_vrhel.mat")),
             Builtin::D65 => ("spd_D65", include_bytes!("../../data/spd_D65.mat")),
             Builtin::Xyz1931 => ("T_xyz1931", include_bytes!("../../data/T_xyz1931.mat")),
             Builtin::CieDaylight => ("B_cieday", include_bytes!("../../data/B_cieday.mat")),
         };
-        let mut table =
-            mat::read(Path::new(name), bytes, Some(name)).expect("compiled-in tables are readable");
-        table.name = name.to_owned();
+        let mut table = mat::read(Path::new(self.name()), bytes, Some(variable))
+            .expect("compiled-in tables are readable");
+        table.name = self.name().to_owned();
+        table.source = table.name.clone();
         if self == Builtin::Munsell {
             // The file runs from 380 to 780 nm, but was padded with zeros where nothing was measured.
             table.crop(400.0, 700.0);

@@ -83,7 +83,10 @@ pub enum DatasetError {
 /// Spectra of one source, as measured: increasing wavelengths (nm), finite values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
+    /// What messages call it: a path and what it takes to find it there.
     name: String,
+    /// What models call it: the same without the folder, which is nobody else's business.
+    source: String,
     wavelengths: Vec<f64>,
     /// A column a spectrum.
     spectra: DMatrix<f64>,
@@ -125,7 +128,7 @@ impl Table {
                 });
             }
         }
-        Ok(Table { name, wavelengths, spectra, kind: None })
+        Ok(Table { source: name.clone(), name, wavelengths, spectra, kind: None })
     }
 
     /// Reads a MATLAB v5 `.mat` file, or a `.csv`, `.tsv` or `.txt` file with the wavelengths in the first column and
@@ -133,14 +136,18 @@ impl Table {
     pub fn open(path: &Path, variable: Option<&str>) -> Result<Table, DatasetError> {
         let bytes = read_capped(path)?;
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        match extension.as_str() {
+        let mut table = match extension.as_str() {
             "mat" => mat::read(path, &bytes, variable),
             "csv" | "tsv" | "txt" => csv::read(path, &bytes),
             _ => Err(DatasetError::UnknownType { path: path.to_owned() }),
-        }
+        }?;
+        let (folder, file) =
+            (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy());
+        table.source = table.name.replace(&format!("{folder:?}"), &file);
+        Ok(table)
     }
 
-    /// What messages and models call the table.
+    /// What messages call the table.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -203,7 +210,7 @@ impl Dataset {
         let count = columns.iter().map(DMatrix::ncols).sum();
         let values = columns.iter().flat_map(|c| c.iter().copied());
         let spectra = DMatrix::from_iterator(grid.len(), count, values);
-        let sources = tables.iter().map(|t| format!("{} ({} spectra)", t.name, t.len())).collect();
+        let sources = tables.iter().map(|t| format!("{} ({} spectra)", t.source, t.len())).collect();
         Ok(Dataset { grid, spectra, sources })
     }
 

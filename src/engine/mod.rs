@@ -1,7 +1,6 @@
-//! Draws in order, for programs without a GPU device of their own: on an adapter that this module opens, or on the CPU.
+//! Draws in order, for programs without a GPU device of their own.
 //!
-//! A range is cut into windows. While a window is handed to the caller the next ones are being computed, and memory is
-//! bounded by the windows in flight, whatever the range. Where the cuts fall never shows in the draws.
+//! A range is cut into windows, of which a few are in flight. Where the cuts fall never shows in the draws.
 
 mod adapter;
 mod cpu;
@@ -71,7 +70,8 @@ fn available(found: &[Adapter]) -> String {
     }
 }
 
-/// What draws. See the [module](self).
+/// What draws: an adapter that it opens, or the CPU. While the caller has one window of draws the next ones are being
+/// computed; memory is bounded by the windows in flight, whatever the range.
 ///
 /// ```
 /// use spectroll::{Choice, Engine, Model, Recipe, Stream};
