@@ -104,7 +104,7 @@ pub(crate) fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS, // the reader has what it wanted
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {error}"); // our messages hold their causes
             ExitCode::from(exit_code(&error))
         }
     }

@@ -1,12 +1,12 @@
 //! `spectroll sample`: draws of a model, into a file.
 
+use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 use spectroll::output::{Existing, Format, Pending};
 use spectroll::{Bounds, Choice, DEFAULT_MAX_ATTEMPTS, Draws, Engine, Recipe, Stream, Summary};
@@ -180,8 +180,11 @@ fn report(arguments: &Arguments, outcome: &Outcome) -> anyhow::Result<()> {
             let share = 100.0 * above_one as f64 / draws as f64;
             eprintln!("  {} spectra ({share:.2} %) reach 1 or more after scaling", grouped(above_one));
         }
-        let rate = outcome.draws_per_second / 1e6;
-        eprintln!("  {:.2} s, {rate:.2} million a second, {}", outcome.seconds, outcome.engine);
+        let rate = match draws {
+            ..100_000 => String::new(), // starting up is most of so short a run
+            _ => format!("{:.2} million a second, ", outcome.draws_per_second / 1e6),
+        };
+        eprintln!("  {:.2} s, {rate}{}", outcome.seconds, outcome.engine);
     }
     Ok(())
 }
@@ -262,7 +265,7 @@ impl Sink {
     fn finish(self) -> anyhow::Result<()> {
         match self {
             Sink::File(pending) => Ok(pending.finish()?),
-            Sink::Stdout(mut out) => out.flush().context("cannot write to standard output"),
+            Sink::Stdout(mut out) => Ok(out.flush()?),
         }
     }
 }
@@ -275,9 +278,14 @@ struct Progress {
 
 impl Progress {
     fn new(arguments: &Arguments, to_stdout: bool) -> Progress {
-        let style = "{bar:40} {percent:>3} %  {human_pos} of {human_len}  {per_sec}  {eta} left";
+        let style = "{bar:40} {percent:>3} %  {human_pos} of {human_len}  {rate}  {eta} left";
+        let rate = |state: &ProgressState, to: &mut dyn fmt::Write| {
+            let _ = write!(to, "{:.1} million/s", state.per_sec() / 1e6);
+        };
         let bar = ProgressBar::with_draw_target(Some(arguments.count), ProgressDrawTarget::hidden());
-        bar.set_style(ProgressStyle::with_template(style).expect("the template is right"));
+        bar.set_style(
+            ProgressStyle::with_template(style).expect("the template is right").with_key("rate", rate),
+        );
         // With data on the same terminal a bar would only be in the way.
         let never = arguments.quiet || (to_stdout && io::stdout().is_terminal());
         Progress { bar, shown: never.into() }

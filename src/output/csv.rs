@@ -7,15 +7,25 @@ use crate::engine::Batch;
 use crate::grid::Grid;
 
 pub(super) fn begin(to: &mut dyn Write, grid: Grid) -> io::Result<()> {
-    let mut writer = ::csv::Writer::from_writer(to);
-    writer.write_record(grid.wavelengths().map(|w| w.to_string()))?;
-    writer.flush()
+    lines(to, [grid.wavelengths().map(|w| w.to_string())])
 }
 
 pub(super) fn write(to: &mut dyn Write, batch: &Batch) -> io::Result<()> {
+    let spectra = batch.spectra.chunks_exact(batch.bands());
+    lines(to, spectra.map(|spectrum| spectrum.iter().map(|value| value.to_string())))
+}
+
+fn lines<L: IntoIterator<Item = String>>(
+    to: &mut dyn Write,
+    lines: impl IntoIterator<Item = L>,
+) -> io::Result<()> {
     let mut writer = ::csv::Writer::from_writer(to);
-    for spectrum in batch.spectra.chunks_exact(batch.bands()) {
-        writer.write_record(spectrum.iter().map(|value| value.to_string()))?;
+    for line in lines {
+        // The crate's own conversion would hide what kind of error it was.
+        writer.write_record(line).map_err(|e| match e.into_kind() {
+            ::csv::ErrorKind::Io(error) => error,
+            other => io::Error::other(format!("{other:?}")),
+        })?;
     }
     writer.flush()
 }
