@@ -293,6 +293,9 @@ impl File {
     }
 
     fn into_parts(self) -> Result<Parts, ModelError> {
+        if self.basis.is_empty() {
+            return Err(ModelError::Components { components: 0, bands: self.wavelengths.len() });
+        }
         Ok(Parts {
             kind: self.kind,
             basis: matrix("basis", &self.basis, self.wavelengths.len())?,

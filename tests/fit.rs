@@ -197,7 +197,7 @@ fn what_is_not_a_model_says_why() {
         ("basis", json!([[0.6, 0.8], [-0.8, 0.6]]), "basis has 2 values where the rest of the model needs 3"),
         ("basis", json!([[0.6, 0.8, 0.0], [0.6, 0.8, 0.0]]), "basis vectors 2 and 1 have the product 1"),
         ("basis", json!([[1.2, 1.6, 0.0], [-0.8, 0.6, 0.0]]), "basis vectors 1 and 1 have the product 4"),
-        ("basis", json!([]), "weight_covariance has 2 values where the rest of the model needs 0"),
+        ("basis", json!([]), "this one has 0 for 3 bands"),
         ("weight_mean", json!([0.0]), "weight_mean has 1 values where the rest of the model needs 2"),
         (
             "weight_covariance",

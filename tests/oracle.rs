@@ -1,7 +1,8 @@
 //! The draws in f32, which every engine makes, against those in f64 of the same random words.
 //!
 //! Rounding can turn a candidate that lies within it of a bound from rejected to accepted or back: such flips are
-//! counted. It is stated in src/normal.rs that the f64 arithmetic shares nothing with that in f32.
+//! counted. Normals in f64 come from the platform's logarithm, sine and cosine, and share no arithmetic with those in
+//! f32.
 
 use rayon::prelude::*;
 use spectroll::{Bounds, Model, Real, Recipe, RecipeBuilder, Stream};
@@ -13,21 +14,26 @@ const DRAWS: u64 = 100_000;
 /// 10^-7 of one of its values, so fewer than one in 10^6 is expected to.
 const FLIPS: usize = 2;
 
-/// The largest error of a value, relative to the factor that scaled it: 5 to 10 roundings of numbers near 1, and
-/// normals that are off by up to 4e-7.
+/// The largest error of a value: some ten roundings of numbers up to 1, and normals that are off by up to 4e-7.
 const ERROR: f64 = 1e-6;
 
-fn recipes() -> Vec<(&'static str, Recipe)> {
+/// The same where there is a target LRV, in parts of the spectrum's peak: the darkest candidates are scaled up tenfold
+/// and more, and their errors with them.
+const SCALED_ERROR: f64 = 1e-5;
+
+fn recipes() -> Vec<(&'static str, Recipe, f64)> {
     let reflectances = Model::builtin("munsell-vrhel").expect("it is built in");
     let daylights = Model::builtin("granada").expect("it is built in");
-    let recipe = |name, builder: RecipeBuilder| (name, builder.build().expect("the recipe can be drawn"));
+    let recipe = |name, builder: RecipeBuilder, error| {
+        (name, builder.build().expect("the recipe can be drawn"), error)
+    };
     vec![
-        recipe("reflectances", Recipe::new(&reflectances)),
-        recipe("covariance x 4", Recipe::new(&reflectances).covariance_scale(4.0)),
-        recipe("LRV 0.6, base", Recipe::new(&reflectances).lrv(0.6)),
-        recipe("LRV 0.6, scaled", Recipe::new(&reflectances).lrv(0.6).bounds(Bounds::Scaled)),
-        recipe("LRV 0.2, both", Recipe::new(&reflectances).lrv(0.2).bounds(Bounds::Both)),
-        recipe("illuminants", Recipe::new(&daylights)),
+        recipe("reflectances", Recipe::new(&reflectances), ERROR),
+        recipe("covariance x 4", Recipe::new(&reflectances).covariance_scale(4.0), ERROR),
+        recipe("LRV 0.6, base", Recipe::new(&reflectances).lrv(0.6), SCALED_ERROR),
+        recipe("LRV 0.6, scaled", Recipe::new(&reflectances).lrv(0.6).bounds(Bounds::Scaled), SCALED_ERROR),
+        recipe("LRV 0.2, both", Recipe::new(&reflectances).lrv(0.2).bounds(Bounds::Both), SCALED_ERROR),
+        recipe("illuminants", Recipe::new(&daylights), ERROR),
     ]
 }
 
@@ -35,7 +41,7 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
 enum Difference {
     /// It took another candidate.
     Flip,
-    /// The largest error of a value, and the largest of the spectrum's values.
+    /// The largest error of a value, and the spectrum's peak.
     Error(f64, f64),
 }
 
@@ -52,20 +58,20 @@ fn difference(recipe: &Recipe, stream: Stream, index: u64) -> Difference {
 #[test]
 fn f32_takes_the_candidates_of_f64_and_keeps_their_values() {
     let mut all_flips = 0;
-    for (name, recipe) in recipes() {
+    for (name, recipe, bound) in recipes() {
         let stream = Stream::named(20, name);
         let differences: Vec<_> =
             (0..DRAWS).into_par_iter().map(|index| difference(&recipe, stream, index)).collect();
         let flips = differences.iter().filter(|d| matches!(d, Difference::Flip)).count();
         let errors = differences.iter().filter_map(|d| match *d {
             Difference::Flip => None,
-            Difference::Error(error, largest) => Some((error, error / largest.max(1.0))),
+            Difference::Error(error, peak) => Some((error, error / peak.max(1.0))),
         });
         let (absolute, relative) = errors.fold((0f64, 0f64), |(a, r), (e, f)| (a.max(e), r.max(f)));
         println!(
             "{name}: {flips} flips in {DRAWS} draws; largest error {absolute:.1e}, {relative:.1e} of the peak"
         );
-        assert!(relative < ERROR, "{name}: an error of {relative:e}");
+        assert!(relative < bound, "{name}: an error of {relative:e}");
         all_flips += flips;
     }
     assert!(all_flips <= FLIPS, "{all_flips} flips");

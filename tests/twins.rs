@@ -33,6 +33,8 @@ fn cpu() -> Engine {
 struct Case {
     recipe: Recipe,
     target: Option<(f64, Bounds)>,
+    /// The weights of the bands in an LRV.
+    lrv_weights: Vec<f64>,
     /// The spectrum at z = 0, and what each normal adds.
     offset: DVector<f64>,
     gain: DMatrix<f64>,
@@ -49,6 +51,7 @@ impl Case {
         Case {
             recipe: recipe.build().expect("the recipe can be drawn"),
             target,
+            lrv_weights: colorimetry::lrv_weights(model.grid()).expect("the grid is visible"),
             offset: model.reconstruct(parts.weight_mean.as_slice()),
             gain: parts.basis.transpose() * model.weight_factor() * scale.sqrt(),
         }
@@ -71,8 +74,7 @@ impl Case {
     }
 
     fn lrv(&self, spectrum: &[f64]) -> f64 {
-        let weights = colorimetry::lrv_weights(self.recipe.model().grid()).expect("the grid is visible");
-        weights.iter().zip(spectrum).map(|(w, s)| w * s).sum()
+        self.lrv_weights.iter().zip(spectrum).map(|(w, s)| w * s).sum()
     }
 }
 
@@ -110,7 +112,8 @@ fn compare(case: &Case, draws: Draws, a: &Rows, b: &Rows, to_the_bit: bool) -> R
         let row = |rows: &Rows| rows.spectra[i * bands..(i + 1) * bands].to_vec();
         let tolerance = if to_the_bit { 0.0 } else { ULPS * case.ulp(draws.stream, index, ta.attempts()) };
         for (band, (x, y)) in row(a).into_iter().zip(row(b)).enumerate() {
-            if x.to_bits() != y.to_bits() && !(f64::from(x - y).abs() <= tolerance) {
+            let close = x.to_bits() == y.to_bits() || f64::from(x - y).abs() <= tolerance;
+            if !close {
                 return Err(format!("draw {index}, band {band}: {x:e} against {y:e}"));
             }
         }
@@ -181,10 +184,7 @@ fn every_rule_at_a_target_lrv() {
         let rows = assert_twins(&case, Stream::new(2).draws(0..20_001));
         let above_one = rows.tallies.iter().filter(|t| t.above_one()).count();
         println!("LRV {lrv} {bounds:?}: {above_one} of 20,001 reach 1 somewhere");
-        assert_eq!(
-            above_one > 0,
-            bounds == Bounds::Base && lrv == 0.6 || above_one > 0 && bounds == Bounds::Base
-        );
+        assert_eq!(above_one > 0, bounds == Bounds::Base);
     }
 }
 

@@ -1,0 +1,163 @@
+//! The pipeline of a draw once more, from the public pieces, with a place for each fault that a sampler might have.
+//! Without a fault its draws are the library's in f64.
+
+use nalgebra::{DMatrix, DVector};
+use spectroll::{Bounds, Kind, Real, Stream, colorimetry, philox};
+
+use crate::sample::{Draw, Scenario};
+
+/// What is wrong with a sampler.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fault {
+    /// Uniforms have 24 bits.
+    Uniforms24,
+    /// The two normals of a pair are the same one.
+    PairEqual,
+    /// The sine comes before the cosine.
+    PairSwapped,
+    /// Every other attempt repeats the one before.
+    AttemptRepeated,
+    /// A further attempt takes the words of the next draw.
+    AttemptOfNext,
+    /// The second block of words is the first.
+    BlockReused,
+    /// Each value is stored one band late.
+    BandShifted,
+    /// The basis is one band late, the mean is not.
+    BasisShifted,
+    /// The first basis vector has the other sign.
+    BasisNegated,
+    /// The covariance is used where its square root should be.
+    CovarianceNotRooted,
+    /// The mean of the weights is left out.
+    WeightMeanDropped,
+    /// Both bounds let 1e-3 more through.
+    BoundsLoose,
+    /// Both bounds let 1e-3 less through.
+    BoundsTight,
+    /// A spectrum that is negative throughout passes, since its factor is negative too.
+    NegativeTwice,
+    /// The LRV leaves out the illuminant.
+    LrvWithoutD65,
+    /// The two words of the seed are swapped.
+    KeySwapped,
+    /// The high word of the index is left out.
+    IndexHighIgnored,
+    /// The number of the stream is left out.
+    StreamIgnored,
+}
+
+pub(crate) struct Pipeline<'a> {
+    scenario: &'a Scenario,
+    fault: Option<Fault>,
+    offset: DVector<f64>,
+    /// A column for each normal.
+    gain: DMatrix<f64>,
+    lrv_weights: Vec<f64>,
+}
+
+impl<'a> Pipeline<'a> {
+    pub(crate) fn new(scenario: &'a Scenario, fault: Option<Fault>) -> Pipeline<'a> {
+        let (model, parts) = (&scenario.model, scenario.model.parts());
+        let mut basis = parts.basis.clone();
+        match fault {
+            Some(Fault::BasisShifted) => {
+                basis = DMatrix::from_fn(basis.nrows(), basis.ncols(), |j, b| {
+                    parts.basis[(j, b.saturating_sub(1))]
+                });
+            }
+            Some(Fault::BasisNegated) => basis.row_mut(0).neg_mut(),
+            _ => {}
+        }
+        let factor = match fault {
+            Some(Fault::CovarianceNotRooted) => parts.weight_covariance.clone(),
+            _ => model.weight_factor(),
+        };
+        let weight_mean = match fault {
+            Some(Fault::WeightMeanDropped) => 0.0 * &parts.weight_mean,
+            _ => parts.weight_mean.clone(),
+        };
+        let grid = model.grid();
+        let [_, y, _] = colorimetry::cmf(grid);
+        Pipeline {
+            scenario,
+            fault,
+            offset: &parts.mean + basis.tr_mul(&weight_mean),
+            gain: basis.tr_mul(&factor) * scenario.scale.sqrt(),
+            lrv_weights: match fault {
+                Some(Fault::LrvWithoutD65) => y.iter().map(|v| v / y.iter().sum::<f64>()).collect(),
+                _ => colorimetry::lrv_weights(grid).expect("the grid is visible"),
+            },
+        }
+    }
+
+    fn has(&self, fault: Fault) -> bool {
+        self.fault == Some(fault)
+    }
+
+    pub(crate) fn draw(&self, stream: Stream, index: u64) -> Draw {
+        (0..)
+            .find_map(|attempt| Some((self.candidate(stream, index, attempt)?, attempt + 1)))
+            .expect("a draw ends")
+    }
+
+    fn words(&self, stream: Stream, index: u64, attempt: u32, block: u32) -> [u32; 4] {
+        let (index, attempt) = match self.fault {
+            Some(Fault::AttemptRepeated) => (index, attempt & !1),
+            Some(Fault::AttemptOfNext) => (index + u64::from(attempt), 0),
+            _ => (index, attempt),
+        };
+        let block = if self.has(Fault::BlockReused) { 0 } else { block };
+        let high = if self.has(Fault::IndexHighIgnored) { 0 } else { (index >> 32) as u32 };
+        let id = if self.has(Fault::StreamIgnored) { 0 } else { stream.id() };
+        let (mut key, seed) = ([stream.seed() as u32, 0], stream.seed());
+        key[1] = (seed >> 32) as u32;
+        if self.has(Fault::KeySwapped) {
+            key.reverse();
+        }
+        let words = philox([index as u32, high, attempt, id << 8 | block], key);
+        if self.has(Fault::Uniforms24) { words.map(|w| w & !0xFF | 0x80) } else { words }
+    }
+
+    fn normals(&self, [a, b, c, d]: [u32; 4]) -> [f64; 4] {
+        let pair = |x, y| {
+            let [cosine, sine] = f64::normal_pair(x, y);
+            match self.fault {
+                Some(Fault::PairEqual) => [cosine, cosine],
+                Some(Fault::PairSwapped) => [sine, cosine],
+                _ => [cosine, sine],
+            }
+        };
+        let ([p, q], [r, s]) = (pair(a, b), pair(c, d));
+        [p, q, r, s]
+    }
+
+    fn candidate(&self, stream: Stream, index: u64, attempt: u32) -> Option<Vec<f64>> {
+        let k = self.gain.ncols();
+        let blocks = 0..k.div_ceil(4) as u32;
+        let normals = blocks.flat_map(|block| self.normals(self.words(stream, index, attempt, block)));
+        let mut base = &self.offset + &self.gain * DVector::from_iterator(k, normals.take(k));
+        if self.has(Fault::BandShifted) {
+            base.as_mut_slice().rotate_right(1);
+        }
+        let margin = match self.fault {
+            Some(Fault::BoundsLoose) => 1e-3,
+            Some(Fault::BoundsTight) => -1e-3,
+            _ => 0.0,
+        };
+        let limit = if self.scenario.model.kind() == Kind::Illuminant { f64::INFINITY } else { 1.0 };
+        let physical = |s: &DVector<f64>| s.iter().all(|&s| s > -margin && s < limit + margin);
+        let Some((target, bounds)) = self.scenario.target else {
+            return physical(&base).then(|| base.as_slice().to_vec());
+        };
+        let lrv: f64 = self.lrv_weights.iter().zip(&base).map(|(w, s)| w * s).sum();
+        let factor = if self.has(Fault::NegativeTwice) { target / lrv } else { target / lrv.max(1e-30) };
+        let scaled = &base * factor;
+        let accepted = match bounds {
+            Bounds::Base => physical(&base),
+            Bounds::Scaled => physical(&scaled),
+            Bounds::Both => physical(&base) && physical(&scaled),
+        };
+        accepted.then(|| scaled.as_slice().to_vec())
+    }
+}
