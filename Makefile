@@ -3,6 +3,8 @@
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
+# Mesa's driver complains where it is unset, as it is in containers.
+export XDG_RUNTIME_DIR ?= /tmp
 export SPECTROLL_PYTHON := $(abspath $(VENV))/bin/python
 
 # A million reflectances, and a picture of what they are drawn from.
