@@ -1,7 +1,14 @@
 //! The draw on the CPU, generic over the arithmetic: in f32 it is the shader's twin, bit for bit where the adapter
 //! does not fuse multiply and add; in f64 it is the oracle that both are judged by. The order of operations is
 //! part of the definition: what looks like it could be summed another way must not be.
+//!
+//! Candidates are made in lanes: L of them at a time, each step in a loop over lanes that the compiler turns into
+//! vector instructions. A lane works on one draw, and takes the next one when it is done, so none waits for its
+//! neighbours' retries. With one lane this is the plain scalar draw; there is no other. [`fill`] is compiled for several levels
+//! of instructions, of which the best is chosen at run time; multiplications and additions are never fused, so all of
+//! them give the same bytes.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::dataset::Kind;
@@ -9,10 +16,18 @@ use crate::normal::Real;
 use crate::program::{self, Program, Tally};
 use crate::stream::{Draws, Stream};
 
+/// How many lanes the f32 engine has: a vector register of AVX-512, two of AVX2.
+const LANES: usize = 16;
+
+/// How many draws a core takes at once: enough that lanes which idle at the end do not count.
+const CHUNK: usize = 4096;
+
 /// A [`Program`] with its numbers rounded to `R`.
 pub(crate) struct Kernel<R> {
     offset: Vec<R>,
-    gain: Vec<Vec<R>>,
+    /// What each standard normal adds, band by band: k values for each.
+    gain: Vec<R>,
+    components: usize,
     target: Option<Target<R>>,
     /// What a physical value is below.
     limit: R,
@@ -27,13 +42,27 @@ struct Target<R> {
     weights: Vec<R>,
 }
 
+/// The candidates that are being made, a lane each.
+struct Candidates<R, const L: usize> {
+    normals: Vec<[R; L]>,
+    spectrum: Vec<[R; L]>,
+}
+
+/// What candidates came to, a lane each.
+struct Verdicts<const L: usize> {
+    accepted: [bool; L],
+    above_one: [bool; L],
+}
+
 impl<R: Real> Kernel<R> {
     pub(crate) fn new(program: &Program) -> Kernel<R> {
         let round = |values: &[f64]| values.iter().map(|&v| R::from_f64(v)).collect();
         let target = |t: &program::Target| Target { lrv: R::from_f64(t.lrv), weights: round(&t.weights) };
+        let by_band = (0..program.bands()).flat_map(|b| program.gain.iter().map(move |gain| gain[b]));
         Kernel {
             offset: round(&program.offset),
-            gain: program.gain.iter().map(|row| round(row)).collect(),
+            gain: by_band.map(R::from_f64).collect(),
+            components: program.components(),
             target: program.target.as_ref().map(target),
             limit: match program.kind {
                 Kind::Illuminant => R::INFINITY,
@@ -52,67 +81,195 @@ impl<R: Real> Kernel<R> {
 
     /// Draw `index` of a stream, into `spectrum`.
     pub(crate) fn draw(&self, stream: Stream, index: u64, spectrum: &mut [R]) -> Tally {
-        for attempt in 0..self.max_attempts {
-            if let Some(above_one) = self.candidate(|block| stream.block(index, attempt, block), spectrum) {
-                return Tally::accepted(attempt + 1, above_one);
-            }
-        }
-        spectrum.fill(R::ZERO);
-        Tally::FAILED
-    }
-
-    /// All of `draws`, in order, on all cores; `spectra` and `tallies` are exactly as long as they need be.
-    pub(crate) fn fill(&self, draws: Draws, spectra: &mut [R], tallies: &mut [Tally]) {
-        const CHUNK: usize = 1024;
-        let chunks = spectra.par_chunks_mut(CHUNK * self.bands()).zip(tallies.par_chunks_mut(CHUNK));
-        chunks.enumerate().for_each(|(chunk, (spectra, tallies))| {
-            for (i, (row, tally)) in spectra.chunks_exact_mut(self.bands()).zip(tallies).enumerate() {
-                let index = draws.first.wrapping_add((chunk * CHUNK + i) as u64);
-                *tally = self.draw(draws.stream, index, row);
-            }
-        });
+        let mut tally = [Tally::FAILED];
+        let draws = Draws { stream, first: index, count: 1 };
+        self.fill_in_lanes::<1>(draws, spectrum, &mut tally);
+        tally[0]
     }
 
     /// The candidate of the words that `block` gives. `None` where it is rejected; else whether scaling took it to 1.
-    pub(crate) fn candidate(&self, block: impl FnMut(u32) -> [u32; 4], spectrum: &mut [R]) -> Option<bool> {
-        self.reconstruct(block, spectrum);
-        if self.tests_base && !self.is_physical(spectrum) {
-            return None;
-        }
-        let Some(target) = &self.target else { return Some(false) };
-        let factor = target.lrv / floored(weighted_sum(&target.weights, spectrum));
-        spectrum.iter_mut().for_each(|s| *s = *s * factor);
-        if self.tests_scaled && !self.is_physical(spectrum) {
-            return None;
-        }
-        Some(self.may_exceed_one && spectrum.iter().any(|&s| s >= R::ONE))
+    pub(crate) fn candidate(
+        &self,
+        mut block: impl FnMut(u32) -> [u32; 4],
+        spectrum: &mut [R],
+    ) -> Option<bool> {
+        let mut candidates = self.candidates::<1>();
+        let verdicts = self.judge(&mut candidates, |b, _| block(b));
+        spectrum.iter_mut().zip(&candidates.spectrum).for_each(|(to, [from])| *to = *from);
+        verdicts.accepted[0].then_some(verdicts.above_one[0])
     }
 
-    fn is_physical(&self, spectrum: &[R]) -> bool {
-        spectrum.iter().all(|&s| s > R::ZERO && s < self.limit)
+    /// All of `draws`, in order; `spectra` and `tallies` are exactly as long as they need be.
+    #[inline(always)]
+    fn fill_in_lanes<const L: usize>(&self, draws: Draws, spectra: &mut [R], tallies: &mut [Tally]) {
+        let mut candidates = self.candidates::<L>();
+        let mut rows = spectra.chunks_exact_mut(self.bands()).zip(tallies).enumerate();
+        let mut next = || {
+            let (i, (row, tally)) = rows.next()?;
+            Some((draws.first.wrapping_add(i as u64), row, tally))
+        };
+        let mut lanes: [_; L] = std::array::from_fn(|_| next());
+        // Lanes without a draw go on with the words of index 0, to no effect.
+        let mut indices: [u64; L] = std::array::from_fn(|l| lanes[l].as_ref().map_or(0, |lane| lane.0));
+        let mut attempts = [0; L];
+        while lanes.iter().any(Option::is_some) {
+            let verdicts = self.judge(&mut candidates, |b, l| draws.stream.block(indices[l], attempts[l], b));
+            for l in 0..L {
+                let Some((_, row, tally)) = &mut lanes[l] else { continue };
+                attempts[l] += 1;
+                if verdicts.accepted[l] {
+                    row.iter_mut().zip(&candidates.spectrum).for_each(|(to, from)| *to = from[l]);
+                    **tally = Tally::accepted(attempts[l], verdicts.above_one[l]);
+                } else if attempts[l] == self.max_attempts {
+                    row.fill(R::ZERO);
+                    **tally = Tally::FAILED;
+                } else {
+                    continue;
+                }
+                attempts[l] = 0;
+                lanes[l] = next();
+                indices[l] = lanes[l].as_ref().map_or(0, |lane| lane.0);
+            }
+        }
     }
 
-    /// offset + gain . z, in the order of the components.
-    #[inline]
-    fn reconstruct(&self, mut block: impl FnMut(u32) -> [u32; 4], spectrum: &mut [R]) {
-        spectrum.copy_from_slice(&self.offset);
-        for (b, gains) in self.gain.chunks(4).enumerate() {
-            let [w0, w1, w2, w3] = block(b as u32);
-            let ([z0, z1], [z2, z3]) = (R::normal_pair(w0, w1), R::normal_pair(w2, w3));
-            for (gain, z) in gains.iter().zip([z0, z1, z2, z3]) {
-                spectrum.iter_mut().zip(gain).for_each(|(s, &g)| *s = *s + g * z);
+    fn candidates<const L: usize>(&self) -> Candidates<R, L> {
+        Candidates {
+            normals: vec![[R::ZERO; L]; self.components.next_multiple_of(4)],
+            spectrum: vec![[R::ZERO; L]; self.bands()],
+        }
+    }
+
+    /// Makes the candidates of the words that `block` gives for each block and lane, and judges them.
+    #[inline(always)]
+    fn judge<const L: usize>(
+        &self,
+        candidates: &mut Candidates<R, L>,
+        block: impl FnMut(u32, usize) -> [u32; 4],
+    ) -> Verdicts<L> {
+        make_normals(&mut candidates.normals, block);
+        let mut physical = Range::new();
+        for (b, s) in candidates.spectrum.iter_mut().enumerate() {
+            *s = self.band(b, &candidates.normals);
+            physical.include(s);
+        }
+        let mut verdicts = Verdicts { accepted: [true; L], above_one: [false; L] };
+        if self.tests_base {
+            verdicts.accepted = std::array::from_fn(|l| physical.is_within(l, self.limit));
+        }
+        if let Some(target) = &self.target {
+            let scaled = target.scale(&mut candidates.spectrum);
+            for l in 0..L {
+                verdicts.accepted[l] &= !self.tests_scaled || scaled.is_within(l, self.limit);
+                verdicts.above_one[l] = self.may_exceed_one && scaled.high[l] >= R::ONE;
+            }
+        }
+        verdicts
+    }
+
+    /// offset + gain . z of a band, in the order of the components.
+    #[inline(always)]
+    fn band<const L: usize>(&self, band: usize, normals: &[[R; L]]) -> [R; L] {
+        let gains = &self.gain[band * self.components..(band + 1) * self.components];
+        let mut sum = [self.offset[band]; L];
+        for (&gain, z) in gains.iter().zip(normals) {
+            for l in 0..L {
+                sum[l] = sum[l] + gain * z[l];
+            }
+        }
+        sum
+    }
+}
+
+impl<R: Real> Target<R> {
+    /// Scales spectra to the target, and says what values they have then.
+    #[inline(always)]
+    fn scale<const L: usize>(&self, spectrum: &mut [[R; L]]) -> Range<R, L> {
+        let mut lrv = [R::ZERO; L];
+        for (b, (&weight, s)) in self.weights.iter().zip(&*spectrum).enumerate() {
+            for l in 0..L {
+                let product = weight * s[l];
+                lrv[l] = if b == 0 { product } else { lrv[l] + product }; // in the order of the bands
+            }
+        }
+        // Floored, so that it may divide; a candidate of negative LRV is not physical anyway.
+        let factor: [R; L] =
+            std::array::from_fn(|l| self.lrv / if lrv[l] > R::FLOOR { lrv[l] } else { R::FLOOR });
+        let mut range = Range::new();
+        for s in spectrum {
+            for l in 0..L {
+                s[l] = s[l] * factor[l];
+            }
+            range.include(s);
+        }
+        range
+    }
+}
+
+/// The least and the largest value of each lane.
+struct Range<R, const L: usize> {
+    low: [R; L],
+    high: [R; L],
+}
+
+impl<R: Real, const L: usize> Range<R, L> {
+    fn new() -> Self {
+        Range { low: [R::INFINITY; L], high: [R::ZERO; L] }
+    }
+
+    #[inline(always)]
+    fn include(&mut self, values: &[R; L]) {
+        for l in 0..L {
+            self.low[l] = if values[l] < self.low[l] { values[l] } else { self.low[l] };
+            self.high[l] = if values[l] > self.high[l] { values[l] } else { self.high[l] };
+        }
+    }
+
+    /// Whether all values of a lane are positive and below `limit`.
+    #[inline(always)]
+    fn is_within(&self, lane: usize, limit: R) -> bool {
+        self.low[lane] > R::ZERO && self.high[lane] < limit
+    }
+}
+
+/// The normals of the words of each block, four a block.
+#[inline(always)]
+fn make_normals<R: Real, const L: usize>(
+    normals: &mut [[R; L]],
+    mut block: impl FnMut(u32, usize) -> [u32; 4],
+) {
+    for (b, four) in normals.chunks_exact_mut(4).enumerate() {
+        let mut words = [[0; L]; 4];
+        for l in 0..L {
+            let w = block(b as u32, l);
+            for i in 0..4 {
+                words[i][l] = w[i];
+            }
+        }
+        for pair in 0..2 {
+            for l in 0..L {
+                let [x, y] = R::normal_pair(words[2 * pair][l], words[2 * pair + 1][l]);
+                four[2 * pair][l] = x;
+                four[2 * pair + 1][l] = y;
             }
         }
     }
 }
 
-/// The sum of products, in the order of the bands.
-fn weighted_sum<R: Real>(weights: &[R], values: &[R]) -> R {
-    let products = weights.iter().zip(values).map(|(&w, &v)| w * v);
-    products.reduce(|sum, product| sum + product).unwrap_or(R::ZERO)
+/// All of `draws` in f32, in order, on all cores; `spectra` and `tallies` are exactly as long as they need be.
+pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, spectra: &mut [f32], tallies: &mut [Tally]) {
+    let chunks = spectra.par_chunks_mut(CHUNK * kernel.bands()).zip(tallies.par_chunks_mut(CHUNK));
+    chunks.enumerate().for_each(|(chunk, (spectra, tallies))| {
+        let part = draws.part((chunk * CHUNK) as u64, tallies.len() as u64);
+        fill_chunk(kernel, part, spectra, tallies);
+    });
 }
 
-/// Not below [`Real::FLOOR`], so that it may divide.
-fn floored<R: Real>(value: R) -> R {
-    if value > R::FLOOR { value } else { R::FLOOR }
+// x86-64-v4 and v3, by what of them matters here; on other architectures the baseline has vectors (NEON).
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx2+bmi2+fma",
+    "x86_64+avx2+bmi2+fma"
+))]
+fn fill_chunk(kernel: &Kernel<f32>, draws: Draws, spectra: &mut [f32], tallies: &mut [Tally]) {
+    kernel.fill_in_lanes::<LANES>(draws, spectra, tallies);
 }

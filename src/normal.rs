@@ -40,7 +40,7 @@ impl Real for f32 {
         value as f32
     }
 
-    #[inline]
+    #[inline(always)]
     fn normal_pair(x: u32, y: u32) -> [f32; 2] {
         let r = radius(x);
         circle(y).map(|v| r * v)
@@ -65,7 +65,7 @@ impl Real for f64 {
 
 /// log(1 + t) for t in [sqrt(1/2) - 1, sqrt(2) - 1]. The coefficients are a minimax fit in f64, rounded one by one
 /// with the rest fitted again; relative error of the polynomial 3e-8.
-#[inline]
+#[inline(always)]
 fn log1p_reduced(t: f32) -> f32 {
     let mut p = 0.087404214;
     p = p * t - 0.14309816;
@@ -80,10 +80,11 @@ fn log1p_reduced(t: f32) -> f32 {
 
 /// sqrt(-2 ln u) of a word. In the upper half u = 1 - w, and w is what is known exactly: forming u would cancel, and
 /// the smallest radii would lose all their digits.
-#[inline]
+#[inline(always)]
 pub(crate) fn radius(x: u32) -> f32 {
     let upper = x >= 0x8000_0000;
-    let w = ((if upper { !x } else { x }) as f32 + 0.5) * 2.3283064e-10; // in (0, 1/2]
+    // Below 2^31, so signed: unsigned conversions are not in every vector unit.
+    let w = ((if upper { !x } else { x }) as i32 as f32 + 0.5) * 2.3283064e-10; // in (0, 1/2]
     // Lower half: w = (1 + t) 2^e with 1 + t in [sqrt(1/2), sqrt(2)).
     let bits = w.to_bits();
     let exponent = bits.wrapping_sub(0x3F35_04F3) & 0xFF80_0000;
@@ -100,7 +101,7 @@ pub(crate) fn radius(x: u32) -> f32 {
 
 /// The cosine and sine of a word. The quarter turn is integer arithmetic, which leaves an angle in [-pi/4, pi/4] for
 /// the polynomials; their errors are 1e-10 and 4e-9.
-#[inline]
+#[inline(always)]
 pub(crate) fn circle(y: u32) -> [f32; 2] {
     let quarter = y.wrapping_add(0x2000_0000) >> 30;
     let rest = y.wrapping_sub(quarter << 30) as i32;

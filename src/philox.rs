@@ -7,7 +7,7 @@ const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: u32 = 10;
 
 /// Four random words of a counter and a key.
-#[inline]
+#[inline(always)]
 pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     let mut c = counter;
     for round in 0..ROUNDS {
@@ -18,6 +18,7 @@ pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     c
 }
 
+#[inline(always)]
 fn wide(a: u32, b: u32) -> u64 {
     u64::from(a) * u64::from(b)
 }

@@ -49,12 +49,13 @@ impl Stream {
     }
 
     /// The key: the seed's low and high words.
+    #[inline(always)]
     pub(crate) fn key(&self) -> [u32; 2] {
         words(self.seed)
     }
 
     /// The four words of a block of an attempt of draw `index`.
-    #[inline]
+    #[inline(always)]
     pub fn block(&self, index: u64, attempt: u32, block: u32) -> [u32; 4] {
         debug_assert!(block < 256);
         let [low, high] = words(index);
@@ -85,6 +86,7 @@ impl Stream {
 }
 
 /// The low and high words of a 64-bit number: the order in which the counter and the shader hold them.
+#[inline(always)]
 pub(crate) fn words(x: u64) -> [u32; 2] {
     [x as u32, (x >> 32) as u32]
 }

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
 use super::{Batch, EngineError, Pace};
-use crate::cpu::Kernel;
+use crate::cpu::{self, Kernel};
 use crate::program::Tally;
 use crate::recipe::Recipe;
 use crate::stream::Draws;
@@ -50,7 +50,7 @@ fn compute(recipe: &Recipe, draws: Draws, emptied: Receiver<Window>, full: SyncS
         let start = Instant::now();
         window.spectra.resize(part.count as usize * kernel.bands(), 0.0);
         window.tallies.resize(part.count as usize, Tally::FAILED);
-        kernel.fill(part, &mut window.spectra, &mut window.tallies);
+        cpu::fill(&kernel, part, &mut window.spectra, &mut window.tallies);
         pace.learn(part.count, start);
         offset += part.count;
         if full.send((part, window)).is_err() {
