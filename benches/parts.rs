@@ -50,8 +50,9 @@ fn draws(c: &mut Criterion) {
         for (engine_name, engine) in &engines {
             let Ok(engine) = engine else { continue };
             let draws = Stream::new(1).draws(0..COUNT);
+            let mut drawer = engine.drawer(&recipe).expect("the engine works");
             group.bench_function(format!("{name}, {engine_name}"), |b| {
-                b.iter(|| engine.draw::<EngineError>(&recipe, draws, |_| Ok(())))
+                b.iter(|| drawer.draw::<EngineError>(draws, |_| Ok(())))
             });
         }
     }

@@ -32,7 +32,7 @@ mod probe;
 pub mod output;
 
 pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
-pub use engine::{Adapter, Batch, Choice, Engine, EngineError, Summary, adapters};
+pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, adapters};
 pub use fit::{Fit, FitError};
 pub use grid::{Extend, Grid, GridError};
 pub use model::{MAX_COMPONENTS, Model, ModelError, Normalization, Parts};

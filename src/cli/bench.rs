@@ -71,9 +71,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 fn measure(engine: &Engine, recipe: &Recipe, arguments: &Arguments) -> anyhow::Result<Rates> {
-    let time = |count: u64| {
+    let mut drawer = engine.drawer(recipe)?;
+    let mut time = |count: u64| {
         let start = Instant::now();
-        engine.draw(recipe, Stream::new(0).draws(0..count), |_| anyhow::Ok(check_interrupt()?))?;
+        drawer.draw(Stream::new(0).draws(0..count), |_| anyhow::Ok(check_interrupt()?))?;
         anyhow::Ok(start.elapsed().as_secs_f64())
     };
     // The first run pays for compiling the shader; the second says how many draws fill the time.

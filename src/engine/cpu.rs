@@ -18,43 +18,65 @@ struct Window {
     tallies: Vec<Tally>,
 }
 
-pub(super) fn draw<E: From<EngineError>>(
-    recipe: &Recipe,
-    draws: Draws,
-    sink: &mut impl FnMut(Batch) -> Result<(), E>,
-) -> Result<(), E> {
-    let (full, filled) = sync_channel(WINDOWS);
-    let (empty, emptied) = sync_channel(WINDOWS);
-    for _ in 0..WINDOWS {
-        empty.send(Window::default()).expect("there is room, and a receiver");
-    }
-    std::thread::scope(|scope| {
-        // Dropped before the scope waits for its thread, which might be waiting for a window.
-        let empty = empty;
-        scope.spawn(move || compute(recipe, draws, emptied, full));
-        for (part, window) in filled {
-            sink(Batch { draws: part, spectra: &window.spectra, tallies: &window.tallies })?;
-            let _ = empty.send(window); // nobody needs it after the last window
-        }
-        Ok(())
-    })
+pub(super) struct Drawer<'a> {
+    recipe: &'a Recipe,
+    kernel: Kernel<f32>,
+    /// Windows that were used before: memory that the system has given already.
+    windows: Vec<Window>,
 }
 
-/// Fills windows until all draws are made, or the caller has gone.
-fn compute(recipe: &Recipe, draws: Draws, emptied: Receiver<Window>, full: SyncSender<(Draws, Window)>) {
-    let kernel = Kernel::<f32>::new(recipe.program());
-    let mut pace = Pace::new(recipe, u64::MAX);
+impl<'a> Drawer<'a> {
+    pub(super) fn new(recipe: &'a Recipe) -> Self {
+        Drawer { recipe, kernel: Kernel::new(recipe.program()), windows: Vec::new() }
+    }
+
+    pub(super) fn draw<E: From<EngineError>>(
+        &mut self,
+        draws: Draws,
+        sink: &mut impl FnMut(Batch) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let (full, filled) = sync_channel(WINDOWS);
+        let (empty, emptied) = sync_channel(WINDOWS);
+        self.windows.resize_with(WINDOWS, Window::default);
+        for window in self.windows.drain(..) {
+            empty.send(window).expect("there is room, and a receiver");
+        }
+        let (kernel, pace) = (&self.kernel, Pace::new(self.recipe, u64::MAX));
+        std::thread::scope(|scope| {
+            let computing = scope.spawn(move || compute(kernel, pace, draws, emptied, full));
+            // Dropped before the thread is waited for, which might itself be waiting for a window.
+            let empty = empty;
+            for (part, window) in filled {
+                sink(Batch { draws: part, spectra: &window.spectra, tallies: &window.tallies })?;
+                let _ = empty.send(window); // nobody fills it after the last
+            }
+            let emptied = computing.join().expect("computing does not panic");
+            self.windows.extend(emptied.try_iter());
+            Ok(())
+        })
+    }
+}
+
+/// Fills windows until all draws are made, or the caller has gone. Returns where the windows come back to.
+fn compute(
+    kernel: &Kernel<f32>,
+    mut pace: Pace,
+    draws: Draws,
+    emptied: Receiver<Window>,
+    full: SyncSender<(Draws, Window)>,
+) -> Receiver<Window> {
     let mut offset = 0;
     while let Some(part) = pace.window(draws, offset) {
-        let Ok(mut window) = emptied.recv() else { return };
+        let Ok(mut window) = emptied.recv() else { break };
         let start = Instant::now();
         window.spectra.resize(part.count as usize * kernel.bands(), 0.0);
         window.tallies.resize(part.count as usize, Tally::FAILED);
-        cpu::fill(&kernel, part, &mut window.spectra, &mut window.tallies);
+        cpu::fill(kernel, part, &mut window.spectra, &mut window.tallies);
         pace.learn(part.count, start);
         offset += part.count;
         if full.send((part, window)).is_err() {
-            return;
+            break;
         }
     }
+    emptied
 }

@@ -70,38 +70,6 @@ impl Gpu {
         (&self.device, &self.queue)
     }
 
-    pub(super) fn draw<E: From<EngineError>>(
-        &self,
-        recipe: &Recipe,
-        draws: Draws,
-        sink: &mut impl FnMut(Batch) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let sampler = Sampler::new(&self.device, recipe);
-        let mut pace = Pace::new(recipe, sampler.max_count(&self.device.limits()));
-        let capacity = draws.part(0, pace.most.min(draws.count));
-        let mut slots =
-            (0..RING).map(|_| Slot::new(self, &sampler, capacity)).collect::<Result<Vec<_>, _>>()?;
-        let mut flying = VecDeque::new();
-        let mut offset = 0;
-        let mut last_end = None;
-        loop {
-            while let Some(part) = pace.window(draws, offset) {
-                let Some(slot) = slots.pop() else { break };
-                flying.push_back(slot.submit(self, part));
-                offset += part.count;
-            }
-            let Some(flight) = flying.pop_front() else { return Ok(()) };
-            let waited = self.land(&flight)?;
-            // Where it was not waited for, the caller sets the pace, and the window says nothing of the device. The
-            // first one says how long the shader took to compile.
-            if let Some(start) = last_end.filter(|_| waited) {
-                pace.learn(flight.draws.count, start);
-            }
-            last_end = Some(Instant::now());
-            slots.push(flight.read(sink)?);
-        }
-    }
-
     /// Waits until a window can be read. Says whether that took any waiting.
     fn land(&self, flight: &Flight) -> Result<bool, EngineError> {
         let mut waited = false;
@@ -123,6 +91,65 @@ impl Gpu {
 
     fn error(&self, reason: String) -> EngineError {
         EngineError::Gpu { adapter: self.adapter.to_string(), reason }
+    }
+}
+
+/// A recipe on a device.
+pub(super) struct Drawer<'a> {
+    gpu: &'a Gpu,
+    sampler: Sampler,
+    pace: Pace,
+    /// The windows that are not in flight.
+    slots: Vec<Slot>,
+    /// How many draws each has room for.
+    capacity: u64,
+}
+
+impl<'a> Drawer<'a> {
+    pub(super) fn new(gpu: &'a Gpu, recipe: &Recipe) -> Self {
+        let sampler = Sampler::new(&gpu.device, recipe);
+        let pace = Pace::new(recipe, sampler.max_count(&gpu.device.limits()));
+        Drawer { gpu, sampler, pace, slots: Vec::new(), capacity: 0 }
+    }
+
+    pub(super) fn draw<E: From<EngineError>>(
+        &mut self,
+        draws: Draws,
+        sink: &mut impl FnMut(Batch) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.make_room(draws)?;
+        let mut flying = VecDeque::new();
+        let mut offset = 0;
+        let mut last_end = None;
+        loop {
+            while let Some(part) = self.pace.window(draws, offset) {
+                let Some(slot) = self.slots.pop() else { break };
+                flying.push_back(slot.submit(self.gpu, part));
+                offset += part.count;
+            }
+            let Some(flight) = flying.pop_front() else { return Ok(()) };
+            let waited = self.gpu.land(&flight)?;
+            // Where it was not waited for, the caller sets the pace, and the window says nothing of the device. The
+            // first one says how long the shader took to compile.
+            if let Some(start) = last_end.filter(|_| waited) {
+                self.pace.learn(flight.draws.count, start);
+            }
+            last_end = Some(Instant::now());
+            self.slots.push(flight.read(sink)?);
+        }
+    }
+
+    /// Sees to it that there are slots for the windows of `draws`. An error while drawing loses some.
+    fn make_room(&mut self, draws: Draws) -> Result<(), EngineError> {
+        let needed = self.pace.most.min(draws.count);
+        if self.capacity < needed {
+            self.slots.clear();
+            self.capacity = needed;
+        }
+        while self.slots.len() < RING {
+            self.slots.push(Slot::new(self.gpu, &self.sampler, draws.part(0, self.capacity))?);
+        }
+        Ok(())
     }
 }
 

@@ -18,8 +18,8 @@ use crate::recipe::Recipe;
 use crate::sampler::SamplerError;
 use crate::stream::Draws;
 
-/// The most bytes of spectra in one window.
-const WINDOW_BYTES: u64 = 16 << 20;
+/// The most bytes of spectra in one window: all windows in flight stay in a cache of 32 MiB.
+const WINDOW_BYTES: u64 = 8 << 20;
 
 /// How long a window should take: short enough for an interrupt and for any watchdog, long enough to hide the cost of
 /// starting one.
@@ -157,24 +157,25 @@ impl Engine {
         self.device.as_ref().map(gpu::Gpu::device)
     }
 
-    /// Makes `draws` and hands them to `sink` in order, window by window. The first error ends it.
+    /// Gets ready to draw from a recipe: what that takes (a compiled shader, buffers) is paid once, and serves any number
+    /// of [`Drawer::draw`].
+    pub fn drawer<'a>(&'a self, recipe: &'a Recipe) -> Result<Drawer<'a>, EngineError> {
+        let way = match &self.device {
+            Some(gpu) => Way::Gpu(gpu::Drawer::new(gpu, recipe)),
+            None => Way::Cpu(cpu::Drawer::new(recipe)),
+        };
+        Ok(Drawer { recipe, way })
+    }
+
+    /// Makes `draws` and hands them to `sink` in order, as [`Drawer::draw`] does, which is what to use for more than one
+    /// range.
     pub fn draw<E: From<EngineError>>(
         &self,
         recipe: &Recipe,
         draws: Draws,
-        mut sink: impl FnMut(Batch) -> Result<(), E>,
+        sink: impl FnMut(Batch) -> Result<(), E>,
     ) -> Result<Summary, E> {
-        let mut summary = Summary::default();
-        let mut checked = |batch: Batch| {
-            summary.add(&batch, recipe.program().max_attempts)?;
-            sink(batch)
-        };
-        match &self.device {
-            _ if draws.count == 0 => {}
-            Some(gpu) => gpu.draw(recipe, draws, &mut checked)?,
-            None => cpu::draw(recipe, draws, &mut checked)?,
-        }
-        Ok(summary)
+        self.drawer(recipe)?.draw(draws, sink)
     }
 
     /// Makes `draws` and returns their spectra: a value for each draw and band, draw by draw.
@@ -185,6 +186,39 @@ impl Engine {
             Ok::<_, EngineError>(())
         })?;
         Ok(spectra)
+    }
+}
+
+/// An engine with a recipe. See [`Engine::drawer`].
+pub struct Drawer<'a> {
+    recipe: &'a Recipe,
+    way: Way<'a>,
+}
+
+enum Way<'a> {
+    Gpu(gpu::Drawer<'a>),
+    Cpu(cpu::Drawer<'a>),
+}
+
+impl Drawer<'_> {
+    /// Makes `draws` and hands them to `sink` in order, window by window. The first error ends it.
+    pub fn draw<E: From<EngineError>>(
+        &mut self,
+        draws: Draws,
+        mut sink: impl FnMut(Batch) -> Result<(), E>,
+    ) -> Result<Summary, E> {
+        let mut summary = Summary::default();
+        let max_attempts = self.recipe.program().max_attempts;
+        let mut checked = |batch: Batch| {
+            summary.add(&batch, max_attempts)?;
+            sink(batch)
+        };
+        match &mut self.way {
+            _ if draws.count == 0 => {}
+            Way::Gpu(drawer) => drawer.draw(draws, &mut checked)?,
+            Way::Cpu(drawer) => drawer.draw(draws, &mut checked)?,
+        }
+        Ok(summary)
     }
 }
 
