@@ -38,7 +38,7 @@ out.flush()
 def run(*command, env=None):
     """Standard output, seconds and peak resident megabytes of a command that must succeed."""
     start = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, env={**os.environ, **(env or {})})
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, **(env or {})})
     out = process.stdout.read().decode()
     _, status, usage = os.wait4(process.pid, 0)
     if status:
@@ -104,7 +104,7 @@ def whole_process(rounds, model, count):
     out = os.path.join(MEMORY, f"spectroll-bench-{os.getpid()}.npy")
     size = count * 31 * 4
     commands = {
-        "spectroll --engine auto": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force"],
+        "spectroll --engine gpu": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force", "--engine", "gpu"],
         "spectroll --engine cpu": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force", "--engine", "cpu"],
         "dd": ["dd", "if=/dev/zero", f"of={out}", "bs=4M", f"count={size >> 22}", "status=none"],
     }
@@ -124,7 +124,8 @@ def whole_process(rounds, model, count):
     seconds.show("s")
     for name in ("numpy", "dd"):
         if name in seconds.samples:
-            seconds.ratio(name, "spectroll --engine auto")
+            seconds.ratio(name, "spectroll --engine gpu")
+            seconds.ratio(name, "spectroll --engine cpu")
     print("  peak resident memory:")
     memory.show("MB")
 
@@ -134,10 +135,10 @@ def latency(rounds, folder):
     out = os.path.join(folder, "one.npy")
     for _ in range(rounds):
         cache = tempfile.mkdtemp(dir=folder)  # so that no shader is compiled already
-        one = [SPECTROLL, "sample", "munsell-vrhel", "-n", "1", "-o", out, "-q", "--force"]
-        seconds.add("first draw, no shader cached", run(*one, env={"MESA_SHADER_CACHE_DIR": cache})[1])
-        seconds.add("first draw, shader cached", run(*one, env={"MESA_SHADER_CACHE_DIR": cache})[1])
-        seconds.add("first draw, --engine cpu", run(*one, "--engine", "cpu")[1])
+        one = [SPECTROLL, "sample", "munsell-vrhel", "-n", "1", "-o", out, "-q", "--force", "--engine"]
+        seconds.add("first draw on the adapter, no shader cached", run(*one, "gpu", env={"MESA_SHADER_CACHE_DIR": cache})[1])
+        seconds.add("first draw on the adapter, shader cached", run(*one, "gpu", env={"MESA_SHADER_CACHE_DIR": cache})[1])
+        seconds.add("first draw on the CPU", run(*one, "cpu")[1])
         fit = [SPECTROLL, "fit", "munsell", "vrhel", "-o", os.path.join(folder, "m.json"), "--force"]
         seconds.add("fit of 632 reflectances", run(*fit)[1])
         shutil.rmtree(cache)

@@ -44,9 +44,10 @@ struct Rates {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let choice = arguments.engine.choice();
     let model = model(&arguments.model)?;
     let recipe = Recipe::new(&model).build()?;
-    let choices = match arguments.engine.choice() {
+    let choices = match choice {
         Some(choice) => vec![choice],
         None => (0..adapters().len()).map(|i| Choice::Adapter(i.to_string())).chain([Choice::Cpu]).collect(),
     };

@@ -8,6 +8,7 @@ mod inspect;
 mod picture;
 mod sample;
 
+use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -46,9 +47,9 @@ enum Command {
 /// Where to draw.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum EngineName {
-    /// The best graphics adapter; the CPU where there is none
+    /// The best graphics hardware; the CPU where there is none
     Auto,
-    /// The best graphics adapter
+    /// The best graphics adapter, be it software
     Gpu,
     /// The CPU, without any driver
     Cpu,
@@ -63,11 +64,18 @@ struct EngineArguments {
     /// Draw on the adapter of this index or name (see `spectroll adapters`)
     #[arg(long, value_name = "NAME|INDEX")]
     adapter: Option<String>,
+    /// How many threads the CPU draws with [default: one a core]
+    #[arg(short, long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
 }
 
 impl EngineArguments {
-    /// What was asked for; nothing where it was not.
+    /// What was asked for; nothing where it was not. Sets the number of threads.
     fn choice(&self) -> Option<Choice> {
+        if let Some(threads) = self.threads {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.get());
+            pool.build_global().expect("nothing has drawn yet");
+        }
         let named = self.engine.map(|engine| match engine {
             EngineName::Auto => Choice::Auto,
             EngineName::Gpu => Choice::Gpu,

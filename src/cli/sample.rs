@@ -103,6 +103,7 @@ struct Outcome {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let choice = arguments.engine.choice().unwrap_or_default();
     let to_stdout = arguments.output == Path::new("-");
     let format = format(arguments, to_stdout)?;
     let model = model(&arguments.model)?;
@@ -125,11 +126,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let draws = Draws { stream, first: arguments.start, count: arguments.count };
 
-    let choice = arguments.engine.choice().unwrap_or_default();
     let engine = Engine::new(&choice)?;
-    if choice == Choice::Auto && engine.adapter().is_none() && !arguments.quiet {
-        eprintln!("no graphics adapter was found: drawing on the CPU");
-    }
+    let why = match (&choice, engine.adapter()) {
+        (Choice::Auto, None) => ", no graphics hardware was found",
+        _ => "",
+    };
 
     let start = Instant::now();
     let mut sink = Sink::create(arguments, to_stdout)?;
@@ -161,7 +162,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             acceptance: summary.acceptance(),
             seconds,
             draws_per_second: summary.draws as f64 / seconds,
-            engine: engine.to_string(),
+            engine: format!("{engine}{why}"),
             version: env!("CARGO_PKG_VERSION"),
         },
     )

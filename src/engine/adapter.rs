@@ -53,11 +53,21 @@ pub fn adapters() -> Vec<Adapter> {
     enumerate().iter().map(Adapter::of).collect()
 }
 
+/// Which adapters will do.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    Any,
+    Hardware,
+}
+
 /// The adapter named by `WGPU_ADAPTER_NAME`, if that is set; else the best: discrete, integrated, virtual, software.
-pub(super) fn best() -> Result<Option<wgpu::Adapter>, EngineError> {
+pub(super) fn best(which: Wanted) -> Result<Option<wgpu::Adapter>, EngineError> {
     if let Some(wanted) = std::env::var("WGPU_ADAPTER_NAME").ok().filter(|name| !name.is_empty()) {
         return find(&wanted).map(Some);
     }
+    let will_do = |adapter: &wgpu::Adapter| {
+        which == Wanted::Any || adapter.get_info().device_type != wgpu::DeviceType::Cpu
+    };
     let rank = |adapter: &wgpu::Adapter| match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
@@ -65,7 +75,7 @@ pub(super) fn best() -> Result<Option<wgpu::Adapter>, EngineError> {
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
     };
-    Ok(enumerate().into_iter().min_by_key(rank)) // the first of the best
+    Ok(enumerate().into_iter().filter(will_do).min_by_key(rank)) // the first of the best
 }
 
 /// The adapter of that index, or whose name holds that text.

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use adapter::Wanted;
 pub use adapter::{Adapter, adapters};
 
 use crate::program::Tally;
@@ -28,7 +29,7 @@ const WINDOW_TIME: Duration = Duration::from_millis(60);
 /// Where to draw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Choice {
-    /// On the best adapter there is, and on the CPU where there is none.
+    /// On the best hardware adapter, and on the CPU where there is none: software Vulkan gives the same draws, but slower.
     #[default]
     Auto,
     /// On the best adapter, hardware before software.
@@ -135,12 +136,12 @@ impl Summary {
 }
 
 impl Engine {
-    /// Opens what `choice` says. With [`Choice::Auto`], a machine without an adapter gets the CPU.
+    /// Opens what `choice` says. The variable `WGPU_ADAPTER_NAME` names the adapter where `choice` does not.
     pub fn new(choice: &Choice) -> Result<Engine, EngineError> {
         let device = match choice {
             Choice::Cpu => None,
-            Choice::Auto => adapter::best()?.map(gpu::Gpu::open).transpose()?,
-            Choice::Gpu => Some(gpu::Gpu::open(adapter::best()?.ok_or(EngineError::NoAdapters)?)?),
+            Choice::Auto => adapter::best(Wanted::Hardware)?.map(gpu::Gpu::open).transpose()?,
+            Choice::Gpu => Some(gpu::Gpu::open(adapter::best(Wanted::Any)?.ok_or(EngineError::NoAdapters)?)?),
             Choice::Adapter(wanted) => Some(gpu::Gpu::open(adapter::find(wanted)?)?),
         };
         Ok(Engine { device })
@@ -226,7 +227,10 @@ impl fmt::Display for Engine {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self.adapter() {
             Some(adapter) => adapter.fmt(f),
-            None => write!(f, "CPU ({} threads)", rayon::current_num_threads()),
+            None => match rayon::current_num_threads() {
+                1 => f.write_str("CPU (1 thread)"),
+                threads => write!(f, "CPU ({threads} threads)"),
+            },
         }
     }
 }
