@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use crate::dataset::Kind;
 use crate::normal::Real;
 use crate::program::{self, Program, Tally};
-use crate::stream::{Draws, Stream};
+use crate::stream::{self, Draws, Stream};
 
 /// How many lanes the f32 engine has: a vector register of AVX-512, two of AVX2.
 const LANES: usize = 16;
@@ -110,7 +110,7 @@ impl<R: Real> Kernel<R> {
         spectrum: &mut [R],
     ) -> Option<bool> {
         let mut candidates = self.candidates::<1>();
-        let verdicts = self.judge(&mut candidates, |b, _| block(b));
+        let verdicts = self.judge(&mut candidates, |b| block(b).map(|word| [word]));
         spectrum.iter_mut().zip(&candidates.spectrum).for_each(|(to, [from])| *to = *from);
         verdicts.accepted[0].then_some(verdicts.above_one[0])
     }
@@ -121,17 +121,18 @@ impl<R: Real> Kernel<R> {
         let mut candidates = self.candidates::<L>();
         let mut rows = spectra.chunks_exact_mut(self.bands()).zip(tallies).enumerate();
         let mut next = || {
-            let (i, (row, tally)) = rows.next()?;
-            Some((draws.first.wrapping_add(i as u64), row, tally))
+            let (i, row) = rows.next()?;
+            Some((draws.first.wrapping_add(i as u64), row))
         };
         let mut lanes: [_; L] = std::array::from_fn(|_| next());
-        // Lanes without a draw go on with the words of index 0, to no effect.
-        let mut indices: [u64; L] = std::array::from_fn(|l| lanes[l].as_ref().map_or(0, |lane| lane.0));
-        let mut attempts = [0; L];
+        let (mut low, mut high, mut attempts) = ([0; L], [0; L], [0; L]);
+        for (l, lane) in lanes.iter().enumerate() {
+            [low[l], high[l]] = index_words(lane);
+        }
         while lanes.iter().any(Option::is_some) {
-            let verdicts = self.judge(&mut candidates, |b, l| draws.stream.block(indices[l], attempts[l], b));
+            let verdicts = self.judge(&mut candidates, |b| draws.stream.blocks([low, high], attempts, b));
             for l in 0..L {
-                let Some((_, row, tally)) = &mut lanes[l] else { continue };
+                let Some((_, (row, tally))) = &mut lanes[l] else { continue };
                 attempts[l] += 1;
                 if verdicts.accepted[l] {
                     candidates.copy(l, row);
@@ -144,24 +145,24 @@ impl<R: Real> Kernel<R> {
                 }
                 attempts[l] = 0;
                 lanes[l] = next();
-                indices[l] = lanes[l].as_ref().map_or(0, |lane| lane.0);
+                [low[l], high[l]] = index_words(&lanes[l]);
             }
         }
     }
 
     fn candidates<const L: usize>(&self) -> Candidates<R, L> {
         Candidates {
-            normals: vec![[R::ZERO; L]; self.components.next_multiple_of(4)],
+            normals: vec![[R::ZERO; L]; self.components.next_multiple_of(2)],
             spectrum: vec![[R::ZERO; L]; self.bands()],
         }
     }
 
-    /// Makes the candidates of the words that `block` gives for each block and lane, and judges them.
+    /// Makes the candidates of the words that `block` gives for each block, and judges them.
     #[inline(always)]
     fn judge<const L: usize>(
         &self,
         candidates: &mut Candidates<R, L>,
-        block: impl FnMut(u32, usize) -> [u32; 4],
+        block: impl FnMut(u32) -> [[u32; L]; 4],
     ) -> Verdicts<L> {
         make_normals(&mut candidates.normals, block);
         let mut physical = Range::new();
@@ -235,9 +236,9 @@ impl<R: Real, const L: usize> Range<R, L> {
 
     #[inline(always)]
     fn include(&mut self, values: &[R; L]) {
-        for l in 0..L {
-            self.low[l] = if values[l] < self.low[l] { values[l] } else { self.low[l] };
-            self.high[l] = if values[l] > self.high[l] { values[l] } else { self.high[l] };
+        for (l, &value) in values.iter().enumerate() {
+            self.low[l] = if value < self.low[l] { value } else { self.low[l] };
+            self.high[l] = if value > self.high[l] { value } else { self.high[l] };
         }
     }
 
@@ -248,28 +249,25 @@ impl<R: Real, const L: usize> Range<R, L> {
     }
 }
 
-/// The normals of the words of each block, four a block.
+/// The normals of the words of each block: four a block, two a pair of words.
 #[inline(always)]
 fn make_normals<R: Real, const L: usize>(
     normals: &mut [[R; L]],
-    mut block: impl FnMut(u32, usize) -> [u32; 4],
+    mut block: impl FnMut(u32) -> [[u32; L]; 4],
 ) {
-    for (b, four) in normals.chunks_exact_mut(4).enumerate() {
-        let mut words = [[0; L]; 4];
-        for l in 0..L {
-            let w = block(b as u32, l);
-            for i in 0..4 {
-                words[i][l] = w[i];
-            }
-        }
-        for pair in 0..2 {
+    for (b, normals) in normals.chunks_mut(4).enumerate() {
+        let words = block(b as u32);
+        for (normals, words) in normals.chunks_exact_mut(2).zip(words.chunks_exact(2)) {
             for l in 0..L {
-                let [x, y] = R::normal_pair(words[2 * pair][l], words[2 * pair + 1][l]);
-                four[2 * pair][l] = x;
-                four[2 * pair + 1][l] = y;
+                [normals[0][l], normals[1][l]] = R::normal_pair(words[0][l], words[1][l]);
             }
         }
     }
+}
+
+/// The words of a lane's index. A lane without a draw goes on with those of 0, to no effect.
+fn index_words<T>(lane: &Option<(u64, T)>) -> [u32; 2] {
+    stream::words(lane.as_ref().map_or(0, |lane| lane.0))
 }
 
 /// All of `draws` in f32, in order, on all cores; `spectra` and `tallies` are exactly as long as they need be.

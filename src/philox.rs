@@ -7,13 +7,25 @@ const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: u32 = 10;
 
 /// Four random words of a counter and a key.
-#[inline(always)]
 pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
-    let mut c = counter;
+    philox_in_lanes(counter.map(|word| [word]), key).map(|[word]| word)
+}
+
+/// The same for L counters under one key, word by word: each step is a loop over lanes, for the compiler to vectorise.
+#[inline(always)]
+pub(crate) fn philox_in_lanes<const L: usize>(counters: [[u32; L]; 4], key: [u32; 2]) -> [[u32; L]; 4] {
+    let mut c = counters;
     for round in 0..ROUNDS {
-        let [a, b] = [wide(MULTIPLIERS[0], c[0]), wide(MULTIPLIERS[1], c[2])];
         let [k0, k1] = [0, 1].map(|i| key[i].wrapping_add(round.wrapping_mul(WEYL[i])));
-        c = [(b >> 32) as u32 ^ c[1] ^ k0, b as u32, (a >> 32) as u32 ^ c[3] ^ k1, a as u32];
+        let mut next = [[0; L]; 4];
+        for l in 0..L {
+            let [a, b] = [wide(MULTIPLIERS[0], c[0][l]), wide(MULTIPLIERS[1], c[2][l])];
+            next[0][l] = (b >> 32) as u32 ^ c[1][l] ^ k0;
+            next[1][l] = b as u32;
+            next[2][l] = (a >> 32) as u32 ^ c[3][l] ^ k1;
+            next[3][l] = a as u32;
+        }
+        c = next;
     }
     c
 }

@@ -11,7 +11,7 @@ use std::ops::{Bound, RangeBounds};
 
 use rand::TryRng;
 
-use crate::philox::philox;
+use crate::philox::philox_in_lanes;
 
 /// The block that [`StreamRng`] reads, beyond any that normals use.
 const RNG_BLOCK: u32 = 254;
@@ -55,11 +55,20 @@ impl Stream {
     }
 
     /// The four words of a block of an attempt of draw `index`.
-    #[inline(always)]
     pub fn block(&self, index: u64, attempt: u32, block: u32) -> [u32; 4] {
+        self.blocks(words(index).map(|word| [word]), [attempt], block).map(|[word]| word)
+    }
+
+    /// The same in L lanes: indices as their low and their high words, and an attempt for each.
+    #[inline(always)]
+    pub(crate) fn blocks<const L: usize>(
+        &self,
+        [low, high]: [[u32; L]; 2],
+        attempts: [u32; L],
+        block: u32,
+    ) -> [[u32; L]; 4] {
         debug_assert!(block < 256);
-        let [low, high] = words(index);
-        philox([low, high, attempt, self.id << 8 | block], self.key())
+        philox_in_lanes([low, high, attempts, [self.id << 8 | block; L]], self.key())
     }
 
     /// The draws of a range of indices, `0..1000` or `5..=u64::MAX`.
@@ -147,6 +156,7 @@ impl TryRng for StreamRng {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::philox::philox;
     use rand::Rng;
 
     /// FNV-1a of "" is its offset basis, and of "a" a published test vector: 811c9dc5 and e40c292c.
