@@ -129,9 +129,10 @@ impl<'a> Drawer<'a> {
             }
             let Some(flight) = flying.pop_front() else { return Ok(()) };
             let waited = self.gpu.land(&flight)?;
-            // Where it was not waited for, the caller sets the pace, and the window says nothing of the device. The
-            // first one says how long the shader took to compile.
-            if let Some(start) = last_end.filter(|_| waited) {
+            // A window that was not waited for says nothing of the device, but that the caller sets the pace; the
+            // first says how long the shader took to compile, and the last is but a remainder.
+            let is_last = flying.is_empty() && offset == draws.count;
+            if let Some(start) = last_end.filter(|_| waited && !is_last) {
                 self.pace.learn(flight.draws.count, start);
             }
             last_end = Some(Instant::now());
