@@ -8,7 +8,7 @@ export XDG_RUNTIME_DIR ?= /tmp
 export SPECTROLL_PYTHON := $(abspath $(VENV))/bin/python
 
 # A million reflectances, and a picture of what they are drawn from.
-demo: driver
+demo:
 	cargo build --locked --release
 	target/release/spectroll sample munsell-vrhel -n 1000000 -o target/reflectances.npy --force
 	target/release/spectroll inspect munsell-vrhel -o target/munsell-vrhel.png --force

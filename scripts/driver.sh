@@ -2,6 +2,8 @@
 # Makes sure that there is a Vulkan driver: installs Mesa's software one on Debian and Ubuntu, says what to do elsewhere.
 set -eu
 
+PATH=$PATH:/usr/sbin:/sbin # where ldconfig is
+
 has_driver() {
     [ -n "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && return 0
     for folder in /usr/share/vulkan/icd.d /etc/vulkan/icd.d /usr/local/share/vulkan/icd.d; do

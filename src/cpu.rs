@@ -1,5 +1,5 @@
 //! The draw on the CPU, generic over the arithmetic: in f32 it is the shader's twin, bit for bit where the adapter
-//! does not fuse multiply and add; in f64 it is the oracle that both are judged by. The order of operations is
+//! neither fuses multiply and add nor rounds division and roots its own way; in f64 it is the oracle that both are judged by. The order of operations is
 //! part of the definition: what looks like it could be summed another way must not be.
 //!
 //! Candidates are made in lanes: L of them at a time, each step in a loop over lanes that the compiler turns into
@@ -19,7 +19,7 @@ use crate::stream::{self, Draws, Stream};
 /// How many lanes the f32 engine has: a vector register of AVX-512, two of AVX2.
 const LANES: usize = 16;
 
-/// How many draws a core takes at once: enough that lanes which idle at the end do not count.
+/// How many draws a core takes at once, at most: enough that lanes which idle at the end do not count.
 const CHUNK: usize = 4096;
 
 /// A [`Program`] with its numbers rounded to `R`.
@@ -272,9 +272,10 @@ fn index_words<T>(lane: &Option<(u64, T)>) -> [u32; 2] {
 
 /// All of `draws` in f32, in order, on all cores; `spectra` and `tallies` are exactly as long as they need be.
 pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, spectra: &mut [f32], tallies: &mut [Tally]) {
-    let chunks = spectra.par_chunks_mut(CHUNK * kernel.bands()).zip(tallies.par_chunks_mut(CHUNK));
+    let size = (tallies.len() / (4 * rayon::current_num_threads())).clamp(8 * LANES, CHUNK);
+    let chunks = spectra.par_chunks_mut(size * kernel.bands()).zip(tallies.par_chunks_mut(size));
     chunks.enumerate().for_each(|(chunk, (spectra, tallies))| {
-        let part = draws.part((chunk * CHUNK) as u64, tallies.len() as u64);
+        let part = draws.part((chunk * size) as u64, tallies.len() as u64);
         fill_chunk(kernel, part, spectra, tallies);
     });
 }

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector, SVD};
 
 use crate::dataset::{Dataset, Kind};
-use crate::model::{Model, Normalization, Parts};
+use crate::model::{MAX_COMPONENTS, Model, Normalization, Parts};
 
 /// How to fit.
 ///
@@ -28,8 +28,8 @@ pub struct Fit {
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum FitError {
-    #[error("a model needs at least 1 component")]
-    NoComponents,
+    #[error("a model of {0} components: it needs at least 1 component, and has at most {MAX_COMPONENTS}")]
+    Components(usize),
     #[error("{components} components need at least {} spectra, and there are {spectra}: ask for fewer with -k", components + 1)]
     TooFewSpectra { components: usize, spectra: usize },
     #[error("all {spectra} spectra are identical: there is no variation to model")]
@@ -70,8 +70,8 @@ impl Fit {
     pub fn fit(&self, data: &Dataset) -> Result<Model, FitError> {
         let k = self.components;
         let (bands, spectra) = data.spectra().shape();
-        if k == 0 {
-            return Err(FitError::NoComponents);
+        if !(1..=MAX_COMPONENTS).contains(&k) {
+            return Err(FitError::Components(k));
         }
         if spectra < k + 1 {
             return Err(FitError::TooFewSpectra { components: k, spectra });
@@ -80,7 +80,11 @@ impl Fit {
         let mean = centred.column_mean(); // eq. 2, 6
         centred.column_iter_mut().for_each(|mut spectrum| spectrum -= &mean);
 
-        // The norm of everything, and of nothing but rounding: below it spectra do not differ.
+        // A decomposition of what is not finite would not end.
+        if !centred.iter().chain(&mean).all(|v| v.is_finite()) {
+            return Err(FitError::Scale);
+        }
+        // Spectra that differ by no more than rounding do not differ.
         let size = mean.amax().max(centred.amax());
         let rounding = size * f64::EPSILON;
         if centred.amax() <= rounding {
@@ -88,6 +92,9 @@ impl Fit {
         }
         // Squares of the data must neither overflow nor vanish; scaling by a power of two costs no digits.
         let scale = 2f64.powi(-(centred.amax().log2().floor() as i32));
+        if !scale.is_finite() {
+            return Err(FitError::Scale);
+        }
         let (singular, basis) = decompose(centred * scale);
         let singular = singular / scale;
         if !singular[0].is_finite()
@@ -150,4 +157,28 @@ fn decompose(columns: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         }
     }
     (svd.singular_values, basis)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Table;
+    use crate::grid::{Extend, Grid};
+
+    /// Finite, but not once they are centred, scaled or divided: a decomposition of such data would never end.
+    #[test]
+    fn data_at_the_ends_of_f64_are_refused() {
+        for (size, normalization) in
+            [(1e-310, Normalization::None), (1.7e308, Normalization::None), (1e-320, Normalization::Mean)]
+        {
+            let spectra: Vec<_> = (0..9)
+                .map(|i| (0..4).map(|b| if (i + b) % 3 == 0 { size } else { -size / 2.0 }).collect())
+                .collect();
+            let wavelengths = vec![400.0, 410.0, 420.0, 430.0];
+            let table = Table::new("extremes", wavelengths, &spectra).unwrap();
+            let data = Dataset::new(&[table], Grid::new(400.0, 10.0, 4).unwrap(), Extend::Error).unwrap();
+            let fit = Fit::new(Kind::Reflectance).components(2).normalization(normalization).fit(&data);
+            assert!(matches!(fit, Err(FitError::Scale | FitError::Power { .. })), "{size:e}: {fit:?}");
+        }
+    }
 }

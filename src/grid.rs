@@ -74,6 +74,13 @@ impl Grid {
             return Grid::new(start, 1.0, 1);
         };
         let step = (stop - start) / (wavelengths.len() - 1) as f64;
+        // Wavelengths that were made from a round step must give it back, and not its rounding errors.
+        let round = (step * 1e9).round() / 1e9;
+        if let Ok(grid) = Grid::new(start, round, wavelengths.len())
+            && grid.wavelengths().eq(wavelengths.iter().copied())
+        {
+            return Ok(grid);
+        }
         let grid = Grid::new(start, step, wavelengths.len())?;
         for (i, (&measured, even)) in wavelengths.iter().zip(grid.wavelengths()).enumerate().skip(1) {
             if (measured - even).abs() > 1e-6 * step {
@@ -138,7 +145,7 @@ impl FromStr for Grid {
         if (steps - steps.round()).abs() > 1e-6 {
             return Err(GridError::Uneven { start, step, stop });
         }
-        Grid::new(start, step, steps.round() as usize + 1) // `as` saturates, and the count is checked there
+        Grid::new(start, step, (steps.round() as usize).saturating_add(1)) // the count is checked there
     }
 }
 
@@ -256,6 +263,8 @@ mod tests {
         let grid: Grid = "400:10:700".parse().unwrap();
         assert_eq!(grid, Grid::DEFAULT);
         assert_eq!(grid.to_string(), "400:10:700");
+        let fine: Grid = "400:0.1:400.3".parse().unwrap();
+        assert_eq!(Grid::from_wavelengths(&fine.wavelengths().collect::<Vec<_>>()), Ok(fine));
         for (text, message) in [
             ("400-700", "start:step:stop"),
             ("400:10", "start:step:stop"),

@@ -13,7 +13,7 @@ use crate::dataset::{Builtin, Dataset, Kind};
 use crate::fit::Fit;
 use crate::grid::{Extend, Grid, GridError};
 
-/// The most components a model may have: what the counter layout of a draw has blocks for (see [`crate::philox`]).
+/// The most components a model may have: what the counter layout of a draw has blocks for (see [`Stream::block`](crate::Stream::block)).
 pub const MAX_COMPONENTS: usize = 1000;
 
 /// The version of the file format that this program writes, and the newest that it reads.
@@ -135,10 +135,14 @@ impl Model {
                 return Err(ModelError::NotFinite { field, value });
             }
         }
+        if parts.weight_covariance.nrows() != k {
+            let found = parts.weight_covariance.nrows();
+            return Err(ModelError::Shape { field: "a column of weight_covariance", found, expected: k });
+        }
         check_orthonormal(&parts.basis)?;
         check_covariance(&parts.weight_covariance)?;
         // Halves that agree to rounding are made to agree exactly, so that a factor of either is the same.
-        parts.weight_covariance = (&parts.weight_covariance + parts.weight_covariance.transpose()) / 2.0;
+        parts.weight_covariance = &parts.weight_covariance / 2.0 + parts.weight_covariance.transpose() / 2.0;
         Ok(Model { parts })
     }
 

@@ -187,7 +187,7 @@ fn check_scale(program: &Program) -> Result<(), RecipeError> {
     if (1e-30..1e30).contains(&largest) { Ok(()) } else { Err(RecipeError::Scale(largest)) }
 }
 
-/// The share of accepted candidates, from a stream that no draw uses.
+/// The share of accepted candidates, of a stream of its own.
 fn pilot(program: &Program) -> f64 {
     let kernel = Kernel::<f64>::new(program);
     let stream = Stream::named(0, "pilot");

@@ -13,7 +13,7 @@ use crate::program::{Bounds, Program};
 const REACH: f64 = 13.0;
 
 /// Coefficients of unit rows below this are dropped: together they move no bound by 1e-7, the solver's tolerance.
-const NEGLIGIBLE: f64 = 1e-10;
+const NEGLIGIBLE: f64 = 1e-12;
 
 /// The bands that leave no room, as indices, where no z is acceptable.
 ///

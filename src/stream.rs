@@ -54,8 +54,9 @@ impl Stream {
         words(self.seed)
     }
 
-    /// The four words of a block of an attempt of draw `index`.
+    /// The four words of a block, below 256, of an attempt of draw `index`.
     pub fn block(&self, index: u64, attempt: u32, block: u32) -> [u32; 4] {
+        assert!(block < 256, "block {block} would be one of another stream");
         self.blocks(words(index).map(|word| [word]), [attempt], block).map(|[word]| word)
     }
 
@@ -82,7 +83,7 @@ impl Stream {
             Bound::Included(&last) if last < first => 0,
             Bound::Included(&last) => (last - first).saturating_add(1),
             Bound::Excluded(&end) => end.saturating_sub(first),
-            Bound::Unbounded => u64::MAX - first,
+            Bound::Unbounded => (u64::MAX - first).saturating_add(1),
         };
         Draws { stream: self, first, count }
     }

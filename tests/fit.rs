@@ -145,7 +145,7 @@ fn what_cannot_be_fitted_says_why() {
     assert_eq!(reflectances(2).fit(&plane).map(|m| m.components()), Ok(2));
     assert_eq!(reflectances(3).fit(&plane).unwrap_err(), FitError::Rank { components: 3, rank: 2 });
     assert!(reflectances(3).fit(&plane).unwrap_err().to_string().contains("rank 2"));
-    assert_eq!(reflectances(0).fit(&plane).unwrap_err(), FitError::NoComponents);
+    assert_eq!(reflectances(0).fit(&plane).unwrap_err(), FitError::Components(0));
     assert_eq!(
         reflectances(5).fit(&plane).unwrap_err(),
         FitError::TooFewSpectra { components: 5, spectra: 5 }

@@ -9,7 +9,7 @@ use std::time::Instant;
 use serde::Serialize;
 use spectroll::{Choice, Engine, Recipe, Stream, adapters};
 
-use super::{EngineArguments, check_interrupt, model};
+use super::{EngineArguments, check_interrupt, model, watch_interrupts};
 
 /// How long one run should take, seconds.
 const RUN: f64 = 0.4;
@@ -51,9 +51,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(choice) => vec![choice],
         None => (0..adapters().len()).map(|i| Choice::Adapter(i.to_string())).chain([Choice::Cpu]).collect(),
     };
+    watch_interrupts();
     let mut all = Vec::new();
     for choice in choices {
-        let engine = Engine::new(&choice)?;
+        let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
         let rates = measure(&engine, &recipe, arguments)?;
         if !arguments.json {
             let mut out = std::io::stdout();

@@ -70,12 +70,8 @@ struct EngineArguments {
 }
 
 impl EngineArguments {
-    /// What was asked for; nothing where it was not. Sets the number of threads.
+    /// What was asked for; nothing where it was not.
     fn choice(&self) -> Option<Choice> {
-        if let Some(threads) = self.threads {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.get());
-            pool.build_global().expect("nothing has drawn yet");
-        }
         let named = self.engine.map(|engine| match engine {
             EngineName::Auto => Choice::Auto,
             EngineName::Gpu => Choice::Gpu,
@@ -92,6 +88,11 @@ struct Interrupted;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
+/// From here on Ctrl-C is for [`check_interrupt`] to see; before, it ends the program.
+fn watch_interrupts() {
+    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed)).expect("this is the only handler");
+}
+
 /// An error once Ctrl-C was pressed: long work asks from time to time.
 fn check_interrupt() -> Result<(), Interrupted> {
     if INTERRUPTED.load(Ordering::Relaxed) { Err(Interrupted) } else { Ok(()) }
@@ -100,7 +101,6 @@ fn check_interrupt() -> Result<(), Interrupted> {
 /// Runs the program.
 pub(crate) fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed)).expect("this is the only handler");
     let result = match &arguments.command {
         Command::Fit(arguments) => fit::run(arguments),
         Command::Sample(arguments) => sample::run(arguments),

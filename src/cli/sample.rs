@@ -11,7 +11,7 @@ use serde::Serialize;
 use spectroll::output::{Existing, Format, Pending};
 use spectroll::{Bounds, Choice, DEFAULT_MAX_ATTEMPTS, Draws, Engine, Recipe, Stream, Summary};
 
-use super::{EngineArguments, Usage, check_interrupt, grouped, model};
+use super::{EngineArguments, Usage, check_interrupt, grouped, model, watch_interrupts};
 
 /// Draw spectra from a model
 ///
@@ -126,12 +126,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let draws = Draws { stream, first: arguments.start, count: arguments.count };
 
-    let engine = Engine::new(&choice)?;
+    let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
     let why = match (&choice, engine.adapter()) {
         (Choice::Auto, None) => ", no graphics hardware was found",
         _ => "",
     };
 
+    watch_interrupts();
     let start = Instant::now();
     let mut sink = Sink::create(arguments, to_stdout)?;
     let progress = Progress::new(arguments, to_stdout);
@@ -274,7 +275,8 @@ impl Sink {
 /// A bar on a terminal, for what takes more than a second.
 struct Progress {
     bar: ProgressBar,
-    shown: std::cell::Cell<bool>,
+    /// Whether the bar has been decided upon: shown, or never to be.
+    settled: std::cell::Cell<bool>,
 }
 
 impl Progress {
@@ -289,14 +291,14 @@ impl Progress {
         );
         // With data on the same terminal a bar would only be in the way.
         let never = arguments.quiet || (to_stdout && io::stdout().is_terminal());
-        Progress { bar, shown: never.into() }
+        Progress { bar, settled: never.into() }
     }
 
     fn advance(&self, draws: u64) {
         self.bar.inc(draws);
-        if !self.shown.get() && self.bar.elapsed() > Duration::from_secs(1) {
+        if !self.settled.get() && self.bar.elapsed() > Duration::from_secs(1) {
             self.bar.set_draw_target(ProgressDrawTarget::stderr()); // which is hidden where it is no terminal
-            self.shown.set(true);
+            self.settled.set(true);
         }
     }
 

@@ -141,9 +141,9 @@ impl Table {
             "csv" | "tsv" | "txt" => csv::read(path, &bytes),
             _ => Err(DatasetError::UnknownType { path: path.to_owned() }),
         }?;
-        let (folder, file) =
+        let (full, file) =
             (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy());
-        table.source = table.name.replace(&format!("{folder:?}"), &file);
+        table.source = table.name.replace(&format!("{full:?}"), &file);
         Ok(table)
     }
 
@@ -185,6 +185,10 @@ impl Table {
             let spline = Spline::new(&self.wavelengths, self.spectrum(j));
             for (value, wavelength) in column.iter_mut().zip(grid.wavelengths()) {
                 *value = spline.at(wavelength, extend);
+                if !value.is_finite() {
+                    let (name, value) = (self.name.clone(), *value);
+                    return Err(DatasetError::NotFinite { name, spectrum: j + 1, wavelength, value });
+                }
             }
         }
         Ok(columns)

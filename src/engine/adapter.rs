@@ -83,10 +83,8 @@ pub(super) fn find(wanted: &str) -> Result<wgpu::Adapter, EngineError> {
     let all = enumerate();
     let holds =
         |adapter: &wgpu::Adapter| adapter.get_info().name.to_lowercase().contains(&wanted.to_lowercase());
-    let position = match wanted.parse::<usize>() {
-        Ok(index) => Some(index).filter(|&index| index < all.len()),
-        Err(_) => all.iter().position(holds),
-    };
+    let index = wanted.parse().ok().filter(|&index: &usize| index < all.len());
+    let position = index.or_else(|| all.iter().position(holds)); // 4090 may be part of a name
     let missing =
         || EngineError::NoAdapter { wanted: wanted.to_owned(), found: all.iter().map(Adapter::of).collect() };
     Ok(all[position.ok_or_else(missing)?].clone())

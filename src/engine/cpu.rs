@@ -19,6 +19,7 @@ struct Window {
 }
 
 pub(super) struct Drawer<'a> {
+    pool: &'a rayon::ThreadPool,
     recipe: &'a Recipe,
     kernel: Kernel<f32>,
     /// Windows that were used before: memory that the system has given already.
@@ -26,8 +27,8 @@ pub(super) struct Drawer<'a> {
 }
 
 impl<'a> Drawer<'a> {
-    pub(super) fn new(recipe: &'a Recipe) -> Self {
-        Drawer { recipe, kernel: Kernel::new(recipe.program()), windows: Vec::new() }
+    pub(super) fn new(pool: &'a rayon::ThreadPool, recipe: &'a Recipe) -> Self {
+        Drawer { pool, recipe, kernel: Kernel::new(recipe.program()), windows: Vec::new() }
     }
 
     pub(super) fn draw<E: From<EngineError>>(
@@ -42,8 +43,9 @@ impl<'a> Drawer<'a> {
             empty.send(window).expect("there is room, and a receiver");
         }
         let (kernel, pace) = (&self.kernel, Pace::new(self.recipe, u64::MAX));
+        let pool = self.pool;
         std::thread::scope(|scope| {
-            let computing = scope.spawn(move || compute(kernel, pace, draws, emptied, full));
+            let computing = scope.spawn(move || compute(pool, kernel, pace, draws, emptied, full));
             // Dropped before the thread is waited for, which might itself be waiting for a window.
             let empty = empty;
             for (part, window) in filled {
@@ -59,6 +61,7 @@ impl<'a> Drawer<'a> {
 
 /// Fills windows until all draws are made, or the caller has gone. Returns where the windows come back to.
 fn compute(
+    pool: &rayon::ThreadPool,
     kernel: &Kernel<f32>,
     mut pace: Pace,
     draws: Draws,
@@ -71,7 +74,7 @@ fn compute(
         let start = Instant::now();
         window.spectra.resize(part.count as usize * kernel.bands(), 0.0);
         window.tallies.resize(part.count as usize, Tally::FAILED);
-        cpu::fill(kernel, part, &mut window.spectra, &mut window.tallies);
+        pool.install(|| cpu::fill(kernel, part, &mut window.spectra, &mut window.tallies));
         pace.learn(part.count, start);
         offset += part.count;
         if full.send((part, window)).is_err() {
@@ -79,4 +82,27 @@ fn compute(
         }
     }
     emptied
+}
+
+#[cfg(test)]
+mod tests {
+    use rayon::prelude::*;
+
+    use crate::engine::{Choice, Engine};
+    use crate::model::Model;
+    use crate::recipe::Recipe;
+    use crate::stream::Stream;
+
+    /// Every thread of the caller's pool waits for draws at once: they must come from others.
+    #[test]
+    fn draws_are_made_for_callers_that_are_rayon_workers() {
+        let recipe = Recipe::new(&Model::builtin("granada").unwrap()).build().unwrap();
+        let engine = Engine::new(&Choice::Cpu).unwrap();
+        let draws = Stream::new(1).draws(0..5000);
+        let expected = engine.collect(&recipe, draws).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        assert_eq!(pool.install(|| engine.collect(&recipe, draws)).unwrap(), expected);
+        let all: Vec<_> = (0..64).into_par_iter().map(|_| engine.collect(&recipe, draws).unwrap()).collect();
+        assert!(all.iter().all(|spectra| *spectra == expected));
+    }
 }

@@ -7,6 +7,7 @@ mod cpu;
 mod gpu;
 
 use std::fmt;
+use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -53,6 +54,8 @@ pub enum EngineError {
     NoAdapters,
     #[error("adapter {adapter}: {reason}")]
     Gpu { adapter: String, reason: String },
+    #[error("cannot start the threads to draw with: {0}; ask for fewer")]
+    Threads(String),
     #[error(transparent)]
     Range(#[from] SamplerError),
     #[error(
@@ -85,7 +88,14 @@ fn available(found: &[Adapter]) -> String {
 /// ```
 #[derive(Debug)]
 pub struct Engine {
-    device: Option<gpu::Gpu>,
+    device: Device,
+}
+
+#[derive(Debug)]
+enum Device {
+    Gpu(gpu::Gpu),
+    /// Threads of its own: those of a caller might all be waiting for their draws.
+    Cpu(rayon::ThreadPool),
 }
 
 /// A window of draws, as they are handed to the caller.
@@ -138,32 +148,51 @@ impl Summary {
 impl Engine {
     /// Opens what `choice` says. The variable `WGPU_ADAPTER_NAME` names the adapter where `choice` does not.
     pub fn new(choice: &Choice) -> Result<Engine, EngineError> {
-        let device = match choice {
+        Engine::with_threads(choice, None)
+    }
+
+    /// The same, with so many threads if it comes to the CPU; one a core unless said.
+    pub fn with_threads(choice: &Choice, threads: Option<NonZeroUsize>) -> Result<Engine, EngineError> {
+        let adapter = match choice {
             Choice::Cpu => None,
-            Choice::Auto => adapter::best(Wanted::Hardware)?.map(gpu::Gpu::open).transpose()?,
-            Choice::Gpu => Some(gpu::Gpu::open(adapter::best(Wanted::Any)?.ok_or(EngineError::NoAdapters)?)?),
-            Choice::Adapter(wanted) => Some(gpu::Gpu::open(adapter::find(wanted)?)?),
+            Choice::Auto => adapter::best(Wanted::Hardware)?,
+            Choice::Gpu => Some(adapter::best(Wanted::Any)?.ok_or(EngineError::NoAdapters)?),
+            Choice::Adapter(wanted) => Some(adapter::find(wanted)?),
+        };
+        let device = match adapter {
+            Some(adapter) => Device::Gpu(gpu::Gpu::open(adapter)?),
+            None => {
+                let builder =
+                    rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, NonZeroUsize::get));
+                Device::Cpu(builder.build().map_err(|e| EngineError::Threads(e.to_string()))?)
+            }
         };
         Ok(Engine { device })
     }
 
     /// The adapter that draws; `None` on the CPU.
     pub fn adapter(&self) -> Option<&Adapter> {
-        self.device.as_ref().map(|gpu| gpu.adapter())
+        match &self.device {
+            Device::Gpu(gpu) => Some(gpu.adapter()),
+            Device::Cpu(_) => None,
+        }
     }
 
     /// The device that draws and its queue, for tests of what runs on it.
     #[cfg(test)]
     pub(crate) fn device(&self) -> Option<(&wgpu::Device, &wgpu::Queue)> {
-        self.device.as_ref().map(gpu::Gpu::device)
+        match &self.device {
+            Device::Gpu(gpu) => Some(gpu.device()),
+            Device::Cpu(_) => None,
+        }
     }
 
     /// Gets ready to draw from a recipe: what that takes (a compiled shader, buffers) is paid once, and serves any number
     /// of [`Drawer::draw`].
     pub fn drawer<'a>(&'a self, recipe: &'a Recipe) -> Result<Drawer<'a>, EngineError> {
         let way = match &self.device {
-            Some(gpu) => Way::Gpu(gpu::Drawer::new(gpu, recipe)),
-            None => Way::Cpu(cpu::Drawer::new(recipe)),
+            Device::Gpu(gpu) => Way::Gpu(gpu::Drawer::new(gpu, recipe)),
+            Device::Cpu(pool) => Way::Cpu(cpu::Drawer::new(pool, recipe)),
         };
         Ok(Drawer { recipe, way })
     }
@@ -225,12 +254,10 @@ impl Drawer<'_> {
 
 impl fmt::Display for Engine {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self.adapter() {
-            Some(adapter) => adapter.fmt(f),
-            None => match rayon::current_num_threads() {
-                1 => f.write_str("CPU (1 thread)"),
-                threads => write!(f, "CPU ({threads} threads)"),
-            },
+        match &self.device {
+            Device::Gpu(gpu) => gpu.adapter().fmt(f),
+            Device::Cpu(pool) if pool.current_num_threads() == 1 => f.write_str("CPU (1 thread)"),
+            Device::Cpu(pool) => write!(f, "CPU ({} threads)", pool.current_num_threads()),
         }
     }
 }
@@ -242,7 +269,7 @@ struct Pace {
 }
 
 impl Pace {
-    /// For rows of `bands` values. The first window has about 10^5 candidates.
+    /// Windows of at most `most` draws. The first has about 10^5 candidates.
     fn new(recipe: &Recipe, most: u64) -> Pace {
         let most = most.min(WINDOW_BYTES / (4 * recipe.model().bands() as u64)).max(2);
         Pace { next: ((recipe.acceptance() * 1e5) as u64).clamp(2, most), most }

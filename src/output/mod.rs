@@ -72,6 +72,7 @@ impl Format {
 pub struct Pending {
     file: BufWriter<NamedTempFile>,
     path: PathBuf,
+    existing: Existing,
 }
 
 /// What to do where a file of the name exists.
@@ -105,18 +106,22 @@ impl Pending {
         #[cfg(unix)] // as any new file; by default only its owner could read it
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         match builder.tempfile_in(folder) {
-            Ok(file) => Ok(Pending { file: BufWriter::new(file), path }),
+            Ok(file) => Ok(Pending { file: BufWriter::new(file), path, existing }),
             Err(source) => Err(OutputError::Write { path, source }),
         }
     }
 
     /// Makes the file appear under its name, complete and on disk.
     pub fn finish(self) -> Result<(), OutputError> {
-        let Pending { file, path } = self;
+        let Pending { file, path, existing } = self;
         let failed = |source| OutputError::Write { path: path.clone(), source };
         let file = file.into_inner().map_err(|e| failed(e.into_error()))?;
         file.as_file().sync_all().map_err(failed)?;
-        file.persist(&path).map_err(|e| failed(e.error))?;
+        match existing {
+            Existing::Keep => file.persist_noclobber(&path), // nobody's file that appeared meanwhile
+            Existing::Replace => file.persist(&path),
+        }
+        .map_err(|e| failed(e.error))?;
         // The name is on disk once the folder is. Not every file system can say so, and the data are safe either way.
         let _ = File::open(folder(&path)).and_then(|folder| folder.sync_all());
         Ok(())
