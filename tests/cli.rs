@@ -77,6 +77,20 @@ fn a_sample_is_the_same_from_every_engine_and_in_every_format() {
     assert_eq!(files(folder.path()), ["cpu.csv", "cpu.npy", "gpu.npy", "part.npy"]);
 }
 
+/// SPECTROLL_PYTHON names a Python that has NumPy; `make test` makes one.
+#[test]
+fn numpy_reads_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(folder.path(), "sample granada -n 1000 --engine cpu -o a.npy");
+    let (_, values) = npy(&folder.path().join("a.npy"));
+    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let code = "import numpy as np; a = np.load('a.npy'); \
+                print(a.shape, a.dtype, a.flags['C_CONTIGUOUS'], repr(float(a[999, 30])))";
+    let output = Command::new(python).args(["-c", code]).current_dir(folder.path()).output().unwrap();
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(out.trim(), format!("(1000, 31) float32 True {}", f64::from(values[30_999])), "{err}");
+}
+
 #[test]
 fn the_summary_says_what_was_made() {
     let folder = tempfile::tempdir().unwrap();
