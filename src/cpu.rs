@@ -1,12 +1,13 @@
 //! The draw on the CPU, generic over the arithmetic: in f32 it is the shader's twin, bit for bit where the adapter
-//! neither fuses multiply and add nor rounds division and roots its own way; in f64 it is the oracle that both are judged by. The order of operations is
-//! part of the definition: what looks like it could be summed another way must not be.
+//! neither fuses multiply and add nor rounds division and roots its own way; in f64 it is the oracle that both are
+//! judged by. The order of operations is part of the definition: what looks like it could be summed another way must
+//! not be.
 //!
 //! Candidates are made in lanes: L of them at a time, each step in a loop over lanes that the compiler turns into
 //! vector instructions. A lane works on one draw, and takes the next one when it is done, so none waits for its
-//! neighbours' retries. With one lane this is the plain scalar draw; there is no other. [`fill`] is compiled for several levels
-//! of instructions, of which the best is chosen at run time; multiplications and additions are never fused, so all of
-//! them give the same bytes.
+//! neighbours' retries. With one lane this is the plain scalar draw; there is no other. [`fill`] is compiled for
+//! several levels of instructions, of which the best is chosen at run time; multiplications and additions are never
+//! fused, so all of them give the same bytes.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
