@@ -50,8 +50,8 @@ struct Candidates<R, const L: usize> {
 }
 
 impl<R: Real, const L: usize> Candidates<R, L> {
-    /// Copies the spectrum of a lane. By fours, and not inlined: with AVX-512 LLVM would make gathers of it, at several
-    /// times the cost of plain loads.
+    /// Copies the spectrum of a lane. By fours, and not inlined: with AVX-512 LLVM would make gathers of it, at
+    /// several times the cost of plain loads.
     #[inline(never)]
     fn copy(&self, lane: usize, row: &mut [R]) {
         let (from, from_rest) = self.spectrum.as_chunks::<4>();

@@ -302,7 +302,8 @@ mod tests {
         assert!(x.iter().zip(&y).all(|(&x, &y)| spline.at(x, Extend::Error) == y));
     }
 
-    /// scipy.interpolate.CubicSpline(x, y, bc_type="not-a-knot") at 1.5, 2.5 and 3.5, through the first 6, 4 and 3 points.
+    /// scipy.interpolate.CubicSpline(x, y, bc_type="not-a-knot") at 1.5, 2.5 and 3.5, through the first 6, 4 and 3
+    /// points.
     #[test]
     fn agrees_with_scipy() {
         let x = [1.0, 2.0, 4.0, 5.0, 5.5, 7.0];

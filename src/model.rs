@@ -13,7 +13,8 @@ use crate::dataset::{Builtin, Dataset, Kind};
 use crate::fit::Fit;
 use crate::grid::{Extend, Grid, GridError};
 
-/// The most components a model may have: what the counter layout of a draw has blocks for (see [`Stream::block`](crate::Stream::block)).
+/// The most components a model may have: what the counter layout of a draw has blocks for (see
+/// [`Stream::block`](crate::Stream::block)).
 pub const MAX_COMPONENTS: usize = 1000;
 
 /// The version of the file format that this program writes, and the newest that it reads.
@@ -31,8 +32,8 @@ pub enum Normalization {
     None,
 }
 
-/// A Gaussian model of spectra: a spectrum is mean + sum over components of weight x basis vector, and the weights are
-/// normal with a mean and a covariance (Singh et al. 2018, appendix, eq. 2-8).
+/// A Gaussian model of spectra: a spectrum is mean + sum over components of weight x basis vector, and the weights
+/// are normal with a mean and a covariance (Singh et al. 2018, appendix, eq. 2-8).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     parts: Parts,

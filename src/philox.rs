@@ -11,7 +11,8 @@ pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     philox_in_lanes(counter.map(|word| [word]), key).map(|[word]| word)
 }
 
-/// The same for L counters under one key, word by word: each step is a loop over lanes, for the compiler to vectorise.
+/// The same for L counters under one key, word by word: each step is a loop over lanes, for the compiler to
+/// vectorise.
 #[inline(always)]
 pub(crate) fn philox_in_lanes<const L: usize>(counters: [[u32; L]; 4], key: [u32; 2]) -> [[u32; L]; 4] {
     let mut c = counters;

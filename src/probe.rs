@@ -1,5 +1,5 @@
-//! The generator's fragments on an adapter, function by function, against their CPU twins: where a draw differs, these
-//! say which part of it does.
+//! The generator's fragments on an adapter, function by function, against their CPU twins: where a draw differs,
+//! these say which part of it does.
 
 use wgpu::BufferUsages;
 use wgpu::util::DeviceExt;

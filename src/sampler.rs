@@ -205,8 +205,8 @@ impl Prepared {
         pass.dispatch_workgroups(self.count.div_ceil(draws_per_workgroup), 1, 1);
     }
 
-    /// The spectra once the pass has run: an f32 for each draw and band, draw by draw, without padding. The buffer may
-    /// be longer by one draw. A draw that failed (see [`Prepared::tallies`]) is all zeros.
+    /// The spectra once the pass has run: an f32 for each draw and band, draw by draw, without padding. The buffer
+    /// may be longer by one draw. A draw that failed (see [`Prepared::tallies`]) is all zeros.
     pub fn spectra(&self) -> &wgpu::Buffer {
         &self.spectra
     }

@@ -3,8 +3,8 @@
 //! Draw i is a pure function of the model, the recipe, the seed, the stream and i. The generator's key is the seed
 //! (low word, high word); its counter is (i low, i high, attempt, stream << 8 | block). Attempts 0, 1, 2, ... are the
 //! candidates of draw i, of which the first acceptable one wins. Blocks 0, 1, ... of an attempt hold the words of its
-//! normals, four a block; block 255 of attempt 0 is kept for uniforms that belong to a draw rather than to an attempt,
-//! and block 254 of attempt 0 feeds [`StreamRng`].
+//! normals, four a block; block 255 of attempt 0 is kept for uniforms that belong to a draw rather than to an
+//! attempt, and block 254 of attempt 0 feeds [`StreamRng`].
 
 use std::convert::Infallible;
 use std::ops::{Bound, RangeBounds};
@@ -30,8 +30,8 @@ impl Stream {
         Stream { seed, id: 0 }
     }
 
-    /// The stream of a name, so that adding a group of draws to a scene does not change another: its 32-bit FNV-1a hash
-    /// h, folded to 24 bits as (h >> 24) ^ (h & 0xffffff).
+    /// The stream of a name, so that adding a group of draws to a scene does not change another: its 32-bit FNV-1a
+    /// hash h, folded to 24 bits as (h >> 24) ^ (h & 0xffffff).
     pub fn named(seed: u64, name: &str) -> Stream {
         let hash =
             name.bytes().fold(0x811C_9DC5, |h: u32, byte| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193));

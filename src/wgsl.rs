@@ -9,7 +9,6 @@
 //! - `normals(key, index, stream, attempt) -> Normals`: k standard normals;
 //! - `is_accepted(Normals) -> bool`;
 //! - `store(Draw, row) -> bool`: writes the spectrum of a draw from element `row` on, zeros where it failed, and says
-//!   whether scaling took it to 1 or above (of two draws, in the paired form);
 //! - `tally(Draw, above_one) -> u32`.
 
 use std::fmt::Write;
@@ -21,8 +20,8 @@ use crate::program::{Program, Tally};
 /// Threads a workgroup.
 pub(crate) const WORKGROUP: u32 = 64;
 
-/// The most gains (bands x components) that are written out as constants. At this size lavapipe takes 2.5 s to compile
-/// the straight lines, which then run 7 times as fast as the loop: they pay from 2e5 draws on.
+/// The most gains (bands x components) that are written out as constants. At this size lavapipe takes 2.5 s to
+/// compile the straight lines, which then run 7 times as fast as the loop: they pay from 2e5 draws on.
 const UNROLLED_GAINS: usize = 2048;
 
 const MUL_WIDE: &str = include_str!("../shaders/mul_wide.wgsl");

@@ -10,9 +10,9 @@ use super::{Usage, grouped};
 
 /// Fit a model to measured spectra
 ///
-/// Files are MATLAB v5 (a matrix X of spectra in columns, and S_X = [start step count] beside it; FILE.mat:X picks one
-/// of several) or CSV (wavelengths in the first column, a spectrum in each other one). The names munsell and vrhel
-/// stand for built-in tables. Several are fitted together.
+/// Files are MATLAB v5 (a matrix X of spectra in columns, and S_X = [start step count] beside it; FILE.mat:X picks
+/// one of several) or CSV (wavelengths in the first column, a spectrum in each other one). The names munsell and
+/// vrhel stand for built-in tables. Several are fitted together.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// Files of spectra, or munsell, vrhel

@@ -364,7 +364,8 @@ fn shown_light(xyz: [f64; 3]) -> [f64; 3] {
     linear.map(|v| v / largest)
 }
 
-/// The standard deviation of the model's spectra, band by band: the root of the diagonal of basis' . covariance . basis.
+/// The standard deviation of the model's spectra, band by band: the root of the diagonal of basis' . covariance .
+/// basis.
 fn deviation(model: &Model) -> Vec<f64> {
     let parts = model.parts();
     let columns = &parts.weight_covariance * &parts.basis;

@@ -9,7 +9,8 @@ use super::{Table, mat};
 pub enum Builtin {
     /// 462 Munsell papers measured by Nickerson: reflectance, 400 to 700 nm by 5 nm.
     Munsell,
-    /// 170 natural and man-made surfaces measured by Vrhel, Gershon & Iwan (1994): reflectance, 390 to 730 nm by 2 nm.
+    /// 170 natural and man-made surfaces measured by Vrhel, Gershon & Iwan (1994): reflectance, 390 to 730 nm by 2
+    /// nm.
     Vrhel,
     /// CIE standard illuminant D65: relative power, 380 to 780 nm by 5 nm.
     D65,

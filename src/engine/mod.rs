@@ -30,7 +30,8 @@ const WINDOW_TIME: Duration = Duration::from_millis(60);
 /// Where to draw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Choice {
-    /// On the best hardware adapter, and on the CPU where there is none: software Vulkan gives the same draws, but slower.
+    /// On the best hardware adapter, and on the CPU where there is none: software Vulkan gives the same draws, but
+    /// slower.
     #[default]
     Auto,
     /// On the best adapter, hardware before software.
@@ -187,8 +188,8 @@ impl Engine {
         }
     }
 
-    /// Gets ready to draw from a recipe: what that takes (a compiled shader, buffers) is paid once, and serves any number
-    /// of [`Drawer::draw`].
+    /// Gets ready to draw from a recipe: what that takes (a compiled shader, buffers) is paid once, and serves any
+    /// number of [`Drawer::draw`].
     pub fn drawer<'a>(&'a self, recipe: &'a Recipe) -> Result<Drawer<'a>, EngineError> {
         let way = match &self.device {
             Device::Gpu(gpu) => Way::Gpu(gpu::Drawer::new(gpu, recipe)),
@@ -197,8 +198,8 @@ impl Engine {
         Ok(Drawer { recipe, way })
     }
 
-    /// Makes `draws` and hands them to `sink` in order, as [`Drawer::draw`] does, which is what to use for more than one
-    /// range.
+    /// Makes `draws` and hands them to `sink` in order, as [`Drawer::draw`] does, which is what to use for more than
+    /// one range.
     pub fn draw<E: From<EngineError>>(
         &self,
         recipe: &Recipe,

@@ -1,5 +1,5 @@
-//! Text: a header of wavelengths in nm, then a line a spectrum, each value the shortest decimal that reads back as the
-//! same f32.
+//! Text: a header of wavelengths in nm, then a line a spectrum, each value the shortest decimal that reads back as
+//! the same f32.
 
 use std::io::{self, Write};
 

@@ -67,7 +67,8 @@ impl Format {
     }
 }
 
-/// Bytes on their way to a name: in a temporary file beside it until [`Pending::finish`], and gone if that never comes.
+/// Bytes on their way to a name: in a temporary file beside it until [`Pending::finish`], and gone if that never
+/// comes.
 #[derive(Debug)]
 pub struct Pending {
     file: BufWriter<NamedTempFile>,
