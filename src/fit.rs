@@ -97,10 +97,8 @@ impl Fit {
         }
         let (singular, basis) = decompose(centred * scale);
         let singular = singular / scale;
-        if !singular[0].is_finite()
-            || singular[0] * singular[0] == 0.0
-            || (singular[0] * singular[0]).is_infinite()
-        {
+        let largest = singular[0] * singular[0];
+        if largest == 0.0 || !largest.is_finite() {
             return Err(FitError::Scale);
         }
         // As MATLAB's and NumPy's rank: what rounding alone can leave is not a component.

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use spectroll::output::{Existing, write_file};
+use spectroll::output::write_file;
 use spectroll::{Builtin, Dataset, Extend, Fit, Grid, Kind, Model, Normalization, Table};
 
-use super::{Usage, grouped};
+use super::{Usage, existing, grouped};
 
 /// Fit a model to measured spectra
 ///
@@ -85,8 +85,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         });
     }
     let model = fit.fit(&data)?;
-    let existing = if arguments.force { Existing::Replace } else { Existing::Keep };
-    write_file(&arguments.output, existing, (model.to_json() + "\n").as_bytes())?;
+    write_file(&arguments.output, existing(arguments.force), (model.to_json() + "\n").as_bytes())?;
     report(&model, &data, &arguments.output);
     Ok(())
 }

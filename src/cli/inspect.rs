@@ -8,10 +8,9 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use spectroll::output::Existing;
 use spectroll::{Model, Normalization, Recipe, RecipeError};
 
-use super::picture;
+use super::{existing, picture};
 
 /// Show what a model is: a table, and a picture where asked
 #[derive(Debug, clap::Args)]
@@ -39,9 +38,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = super::model(&arguments.model)?;
     let recipe = Recipe::new(&model).build();
     if let (Some(path), Some(format)) = (&arguments.output, format) {
-        let existing = if arguments.force { Existing::Replace } else { Existing::Keep };
         let figure = picture::Picture { model: &model, recipe: recipe.as_ref().ok(), seed: arguments.seed };
-        figure.write(path, format, existing)?;
+        figure.write(path, format, existing(arguments.force))?;
     }
     let table = table(&arguments.model, &model, &recipe);
     std::io::stdout().lock().write_all(table.as_bytes())?;

@@ -14,6 +14,7 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, Subcommand, ValueEnum};
+use spectroll::output::Existing;
 use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, RecipeError};
 
 /// Draws random, physically valid natural spectra on the GPU.
@@ -155,6 +156,11 @@ fn model(name: &str) -> anyhow::Result<Model> {
         )));
     }
     Ok(Model::load(Path::new(name))?)
+}
+
+/// What `--force` says of a file that exists.
+fn existing(force: bool) -> Existing {
+    if force { Existing::Replace } else { Existing::Keep }
 }
 
 /// A number with its thousands set apart.

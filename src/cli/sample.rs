@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
-use spectroll::output::{Existing, Format, Pending};
+use spectroll::output::{Format, Pending};
 use spectroll::{Bounds, Choice, DEFAULT_MAX_ATTEMPTS, Draws, Engine, Recipe, Stream, Summary};
 
-use super::{EngineArguments, Usage, check_interrupt, grouped, model, watch_interrupts};
+use super::{EngineArguments, Usage, check_interrupt, existing, grouped, model, watch_interrupts};
 
 /// Draw spectra from a model
 ///
@@ -243,10 +243,9 @@ enum Sink {
 
 impl Sink {
     fn create(arguments: &Arguments, to_stdout: bool) -> anyhow::Result<Sink> {
-        let existing = if arguments.force { Existing::Replace } else { Existing::Keep };
         Ok(match to_stdout {
             true => Sink::Stdout(io::BufWriter::new(io::stdout())),
-            false => Sink::File(Pending::create(&arguments.output, existing)?),
+            false => Sink::File(Pending::create(&arguments.output, existing(arguments.force))?),
         })
     }
 
