@@ -1,10 +1,8 @@
 // The arithmetic of a program too large for straight lines: the same operations in the same order, in loops over
-// components and bands that read the model from a buffer. Before it come the constants BANDS, COMPONENTS, BLOCKS and
-// LIMIT; the buffer holds what `model_buffer` of src/wgsl.rs says.
+// components and bands that read the model from a buffer. Before it come the constants BANDS, COMPONENTS and BLOCKS;
+// the buffer holds what `tables` of src/wgsl/mod.rs says.
 
 alias Normals = array<f32, 4u * BLOCKS>;
-
-@group(0) @binding(3) var<storage, read> model: array<f32>;
 
 fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Normals {
     var z: Normals;
@@ -20,48 +18,21 @@ fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Norma
     return z;
 }
 
-fn band(z: ptr<function, Normals>, b: u32) -> f32 {
-    let row = b * (COMPONENTS + 1u);
-    var s = model[row];
+// A row of the model: a band, or a value of another quantity.
+fn form(z: ptr<function, Normals>, row: u32) -> f32 {
+    let start = row * (COMPONENTS + 1u);
+    var s = tables[start];
     for (var j = 0u; j < COMPONENTS; j++) {
-        s += model[row + 1u + j] * (*z)[j];
+        s += tables[start + 1u + j] * (*z)[j];
     }
     return s;
 }
 
-fn luminance(z: ptr<function, Normals>) -> f32 {
-    let weights = BANDS * (COMPONENTS + 1u);
-    var lrv = model[weights] * band(z, 0u);
-    for (var b = 1u; b < BANDS; b++) {
-        lrv += model[weights + b] * band(z, b);
-    }
-    return lrv;
-}
-
-// Whether every band, times `f`, is physical.
-fn all_physical(z: ptr<function, Normals>, f: f32) -> bool {
-    for (var b = 0u; b < BANDS; b++) {
-        if excess(band(z, b) * f) >= LIMIT {
-            return false;
-        }
-    }
-    return true;
-}
-
-fn is_accepted(normals: Normals) -> bool {
+fn worst(normals: Normals) -> u32 {
     var z = normals;
-    ACCEPTED
-}
-
-fn store(d: Draw, row: u32) -> bool {
-    var z = d.z;
-    let ok = d.attempts != 0u;
-    let f = FACTOR;
-    var above_one = false;
+    var e = 0u;
     for (var b = 0u; b < BANDS; b++) {
-        let value = select(0f, band(&z, b) * f, ok);
-        spectra[row + b] = value;
-        above_one |= value >= 1f;
+        e = max(e, excess(form(&z, b)));
     }
-    return above_one;
+    return e;
 }

@@ -6,6 +6,8 @@ struct Parameters {
     // The stream's number, shifted to where the counter has it.
     stream: u32,
     max_attempts: u32,
+    // How many values there are from one plane to the next.
+    plane: u32,
 }
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
@@ -15,5 +17,5 @@ fn draw_at(i: u32) -> Draw {
     let low = parameters.first.x + i;
     let carry = select(0u, 1u, low < i);
     let index = vec2(low, parameters.first.y + carry);
-    return draw(parameters.key, index, parameters.stream, parameters.max_attempts);
+    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts);
 }

@@ -3,3 +3,8 @@
 fn excess(x: f32) -> u32 {
     return bitcast<u32>(x) - 1u;
 }
+
+// The largest of several positive values, by the largest excess.
+fn peak(excess_of_all: u32) -> f32 {
+    return bitcast<f32>(excess_of_all + 1u);
+}

@@ -1,8 +1,6 @@
 //! CIE 1931 colorimetry on a grid: the only home of the colour matching functions, of D65, and of the weights that
 //! turn a reflectance into its luminous reflectance value (LRV).
 
-use nalgebra::{Matrix3, Vector3};
-
 use crate::dataset::Builtin;
 use crate::grid::{Extend, Grid, Spline};
 
@@ -16,6 +14,13 @@ pub fn cmf(grid: Grid) -> [Vec<f64>; 3] {
     [0, 1, 2].map(|function| on_grid(Builtin::Xyz1931, function, grid))
 }
 
+/// The CIE standard illuminant A on a grid (relative power, 100 at 560 nm): a black body of 2848 K in the temperature
+/// scale of 1931 (CIE 15:2004, eq. 3.1).
+pub fn illuminant_a(grid: Grid) -> Vec<f64> {
+    let planck = |nm: f64| nm.powi(-5) / (1.435e7 / (2848.0 * nm)).exp_m1();
+    grid.wavelengths().map(|w| 100.0 * planck(w) / planck(560.0)).collect()
+}
+
 fn on_grid(table: Builtin, spectrum: usize, grid: Grid) -> Vec<f64> {
     let table = table.table();
     let spline = Spline::new(table.wavelengths(), table.spectrum(spectrum));
@@ -25,7 +30,11 @@ fn on_grid(table: Builtin, spectrum: usize, grid: Grid) -> Vec<f64> {
 /// The weights of X, Y and Z for reflectances under D65: tristimulus values are their products with a reflectance,
 /// and a perfect white has Y = 1. `None` where the grid has no light that the eye sees.
 pub fn xyz_weights(grid: Grid) -> Option<[Vec<f64>; 3]> {
-    let light = d65(grid);
+    xyz_weights_under(&d65(grid), grid)
+}
+
+/// The same under another illuminant, of which each band has its power, in any unit. `None` where none of it is seen.
+pub fn xyz_weights_under(light: &[f64], grid: Grid) -> Option<[Vec<f64>; 3]> {
     let cmf = cmf(grid);
     let white: f64 = light.iter().zip(&cmf[1]).map(|(e, y)| e * y).sum();
     (white > 0.0).then(|| cmf.map(|f| light.iter().zip(&f).map(|(e, f)| e * f / white).collect()))
@@ -37,15 +46,17 @@ pub fn lrv_weights(grid: Grid) -> Option<Vec<f64>> {
     xyz_weights(grid).map(|[_, y, _]| y)
 }
 
-/// Linear Rec. 709 components of XYZ relative to D65 white (IEC 61966-2-1), unclamped.
+/// The linear Rec. 709 components of X, Y and Z relative to D65 white, a row each (IEC 61966-2-1).
+#[rustfmt::skip]
+pub const XYZ_TO_SRGB: [[f64; 3]; 3] = [
+    [ 3.2406255, -1.537208,  -0.4986286],
+    [-0.9689307,  1.8757561,  0.0415175],
+    [ 0.0557101, -0.2040211,  1.0569959],
+];
+
+/// Linear Rec. 709 components of XYZ relative to D65 white, unclamped.
 pub fn linear_srgb(xyz: [f64; 3]) -> [f64; 3] {
-    #[rustfmt::skip]
-    let matrix = Matrix3::new(
-         3.2406255, -1.537208,  -0.4986286,
-        -0.9689307,  1.8757561,  0.0415175,
-         0.0557101, -0.2040211,  1.0569959,
-    );
-    (matrix * Vector3::from(xyz)).into()
+    XYZ_TO_SRGB.map(|row| row.iter().zip(xyz).map(|(m, v)| m * v).sum())
 }
 
 /// 8-bit sRGB of linear components (IEC 61966-2-1), which are clamped to 0..1.

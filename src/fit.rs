@@ -76,7 +76,7 @@ impl Fit {
         if spectra < k + 1 {
             return Err(FitError::TooFewSpectra { components: k, spectra });
         }
-        let mut centred = self.normalized(data)?;
+        let (mut centred, powers) = self.normalized(data)?;
         let mean = centred.column_mean(); // eq. 2, 6
         centred.column_iter_mut().for_each(|mut spectrum| spectrum -= &mean);
 
@@ -119,14 +119,16 @@ impl Fit {
             weight_covariance: DMatrix::from_diagonal(&variances),
             explained_variance: singular.iter().take(k).map(|s| s * s / total).collect(),
             normalization: self.normalization,
+            powers,
             sources: data.sources().to_vec(),
         })
         .expect("singular vectors are orthonormal and variances are not negative"))
     }
 
-    /// The spectra, a column each, divided by what `normalization` says (eq. 1).
-    fn normalized(&self, data: &Dataset) -> Result<DMatrix<f64>, FitError> {
+    /// The spectra, a column each, divided by what `normalization` says (eq. 1), and what that was.
+    fn normalized(&self, data: &Dataset) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
         let mut spectra = data.spectra().clone();
+        let mut powers = Vec::new();
         for (i, mut spectrum) in spectra.column_iter_mut().enumerate() {
             let mean = spectrum.mean();
             let divisor = match self.normalization {
@@ -138,8 +140,9 @@ impl Fit {
                 return Err(FitError::Power { place: data.place(i), power: mean });
             }
             spectrum /= divisor;
+            powers.push(divisor);
         }
-        Ok(spectra)
+        Ok((spectra, powers))
     }
 }
 

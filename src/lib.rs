@@ -12,13 +12,16 @@ mod fit;
 mod model;
 
 mod program;
+mod quantity;
 mod region;
 
+mod level;
 mod normal;
 mod philox;
 mod stream;
 
 mod cpu;
+mod outputs;
 mod recipe;
 
 mod wgsl;
@@ -39,7 +42,9 @@ pub use model::{MAX_COMPONENTS, Model, ModelError, Normalization, Parts};
 pub use normal::Real;
 pub use philox::philox;
 pub use program::{Bounds, Tally};
-pub use recipe::{DEFAULT_MAX_ATTEMPTS, Recipe, RecipeBuilder, RecipeError};
+pub use quantity::{Element, Format, Layout, Quantity};
+pub use recipe::{DEFAULT_MAX_ATTEMPTS, Drawn, Intensity, Luminance, Recipe, RecipeBuilder, RecipeError};
 pub use sampler::{Prepared, Sampler, SamplerError};
 pub use stream::{Draws, Stream, StreamRng};
 pub use wgpu;
+pub use wgsl::TextError;

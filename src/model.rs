@@ -58,6 +58,8 @@ pub struct Parts {
     pub explained_variance: Vec<f64>,
     /// What the spectra were divided by.
     pub normalization: Normalization,
+    /// What each of the spectra was divided by, positive; none where that is not known or nothing was.
+    pub powers: Vec<f64>,
     /// Where the data came from, a line each.
     pub sources: Vec<String>,
 }
@@ -89,6 +91,8 @@ pub enum ModelError {
         "basis vectors {row} and {column} have the product {product} where an orthonormal basis has {expected} (to 1e-9)"
     )]
     NotOrthonormal { row: usize, column: usize, product: f64, expected: f64 },
+    #[error("powers holds {0}; what spectra are divided by is finite and above 0")]
+    Power(f64),
     #[error("weight_covariance is not symmetric: entries {row},{column} and {column},{row} differ")]
     NotSymmetric { row: usize, column: usize },
     #[error(
@@ -139,6 +143,9 @@ impl Model {
         if parts.weight_covariance.nrows() != k {
             let found = parts.weight_covariance.nrows();
             return Err(ModelError::Shape { field: "a column of weight_covariance", found, expected: k });
+        }
+        if let Some(&value) = parts.powers.iter().find(|power| !(power.is_finite() && **power > 0.0)) {
+            return Err(ModelError::Power(value));
         }
         check_orthonormal(&parts.basis)?;
         check_covariance(&parts.weight_covariance)?;
@@ -277,6 +284,8 @@ struct File {
     weight_covariance: Vec<Vec<f64>>,
     explained_variance: Vec<f64>,
     normalization: Normalization,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    powers: Vec<f64>,
     sources: Vec<String>,
 }
 
@@ -293,6 +302,7 @@ impl File {
             weight_covariance: rows(&parts.weight_covariance),
             explained_variance: parts.explained_variance.clone(),
             normalization: parts.normalization,
+            powers: parts.powers.clone(),
             sources: parts.sources.clone(),
         }
     }
@@ -310,6 +320,7 @@ impl File {
             weight_mean: self.weight_mean.into(),
             explained_variance: self.explained_variance,
             normalization: self.normalization,
+            powers: self.powers,
             sources: self.sources,
         })
     }

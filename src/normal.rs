@@ -12,6 +12,8 @@ use std::f32::consts::LN_2;
 use std::f64::consts::{SQRT_2, TAU};
 use std::ops::{Add, Div, Mul};
 
+use crate::level;
+
 /// A floating-point type that draws can be computed in: f32, the shader's twin, or f64, its oracle.
 pub trait Real:
     Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Send + Sync + 'static
@@ -28,6 +30,10 @@ pub trait Real:
     fn from_f64(value: f64) -> Self;
     /// Two independent standard normals of two independent uniform words.
     fn normal_pair(x: u32, y: u32) -> [Self; 2];
+    /// The uniform number (x + 1/2) 2^-32 of a word.
+    fn uniform(x: u32) -> Self;
+    /// 2 to this power, which is between 0 and 126.
+    fn exp2(self) -> Self;
 }
 
 impl Real for f32 {
@@ -45,6 +51,16 @@ impl Real for f32 {
         let r = radius(x);
         circle(y).map(|v| r * v)
     }
+
+    #[inline(always)]
+    fn uniform(x: u32) -> f32 {
+        level::uniform(x)
+    }
+
+    #[inline(always)]
+    fn exp2(self) -> f32 {
+        level::exp2(self)
+    }
 }
 
 impl Real for f64 {
@@ -60,6 +76,14 @@ impl Real for f64 {
     fn normal_pair(x: u32, y: u32) -> [f64; 2] {
         let r = exact_radius(x);
         exact_circle(y).map(|v| r * v)
+    }
+
+    fn uniform(x: u32) -> f64 {
+        (f64::from(x) + 0.5) * 2f64.powi(-32)
+    }
+
+    fn exp2(self) -> f64 {
+        f64::exp2(self)
     }
 }
 

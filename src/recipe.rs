@@ -11,9 +11,12 @@ use crate::dataset::Kind;
 use crate::grid::Grid;
 use crate::model::Model;
 use crate::normal::Real;
-use crate::program::{Bounds, Program, Tally, Target};
+use crate::outputs::{Asked, outputs};
+use crate::program::{Affine, Bounds, Level, Program, Tally, Target};
+use crate::quantity::{Element, Format, Layout, Quantity};
 use crate::region;
 use crate::stream::Stream;
+use crate::wgsl::{self, TextError};
 
 /// How many candidates a draw may take unless asked otherwise.
 pub const DEFAULT_MAX_ATTEMPTS: u32 = 1 << 16;
@@ -40,7 +43,31 @@ pub struct RecipeBuilder {
     lrv: Option<f64>,
     bounds: Bounds,
     covariance_scale: f64,
+    intensity: Option<Intensity>,
     max_attempts: u32,
+    outputs: Asked,
+}
+
+/// What an illuminant is multiplied by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Intensity {
+    /// This.
+    Fixed(f64),
+    /// Something between the two, uniform in its logarithm, for each draw.
+    LogUniform(f64, f64),
+    /// For each draw one of what the model's data were divided by before the fit, each as likely: their mean powers,
+    /// unless the fit says otherwise.
+    Data,
+}
+
+/// The scale of an illuminant's tristimulus values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Luminance {
+    /// Sums of power x colour matching function x step in nm, without the 683 lm/W of luminous units.
+    #[default]
+    Absolute,
+    /// Y = 1.
+    One,
 }
 
 /// Why a recipe cannot be drawn.
@@ -58,6 +85,28 @@ pub enum RecipeError {
     Invisible(Grid),
     #[error("no reflectance of this model has a luminous reflectance of {lrv}: the largest is {largest:.6}")]
     UnreachableLrv { lrv: f64, largest: f64 },
+    #[error("an intensity of {0}: it must be above 0, finite and within what f32 holds")]
+    Intensity(f64),
+    #[error(
+        "an intensity between {low} and {high}: the first must be below the second, and no more than 2^126 below"
+    )]
+    IntensityRange { low: f64, high: f64 },
+    #[error("an intensity belongs to illuminants, and this model is of reflectances")]
+    IntensityOfReflectance,
+    #[error(
+        "this model does not hold what its data were divided by: fit it again, normalized, or give intensities"
+    )]
+    NoPowers,
+    #[error("{quantity} cannot come out: {reason}")]
+    Quantity { quantity: Quantity, reason: &'static str },
+    #[error("nothing is asked for: a recipe has at least one quantity")]
+    Nothing,
+    #[error("an illuminant of {found} values where the model has {expected} bands")]
+    Light { found: usize, expected: usize },
+    #[error(
+        "the illuminant that surfaces are seen under has no luminance, or a value that is negative or not finite"
+    )]
+    DarkLight,
     #[error("a covariance scale of {0}: it must be finite and not negative")]
     CovarianceScale(f64),
     #[error("a draw needs at least 1 attempt and at most 2147483647, not {0}")]
@@ -91,7 +140,9 @@ impl Recipe {
             lrv: None,
             bounds: Bounds::default(),
             covariance_scale: 1.0,
+            intensity: None,
             max_attempts: DEFAULT_MAX_ATTEMPTS,
+            outputs: Asked::default(),
         }
     }
 
@@ -105,11 +156,40 @@ impl Recipe {
         self.acceptance
     }
 
+    /// What comes out, and how it lies in memory, in the order of [`Quantity`].
+    pub fn formats(&self) -> Vec<Format> {
+        self.program.outputs.iter().map(|output| output.format).collect()
+    }
+
     /// Draw `index` of a stream, on the CPU: in f32 as the shader makes it, in f64 without its rounding errors.
-    pub fn draw<R: Real>(&self, stream: Stream, index: u64) -> (Vec<R>, Tally) {
-        let mut spectrum = vec![R::ZERO; self.program.bands()];
-        let tally = Kernel::new(&self.program).draw(stream, index, &mut spectrum);
-        (spectrum, tally)
+    pub fn draw<R: Real>(&self, stream: Stream, index: u64) -> Drawn<R> {
+        let (values, tally) = Kernel::new(&self.program).draw(stream, index);
+        Drawn { tally, values: self.program.outputs.iter().map(|o| o.format.quantity).zip(values).collect() }
+    }
+
+    /// The draw as a WGSL module without bindings or entry points, for shaders of a host on any version of wgpu or any
+    /// other engine. Every name has `prefix` and an underscore before it, so that several recipes fit in one shader:
+    ///
+    /// - `PREFIX_draw(seed: vec2<u32>, index: vec2<u32>) -> PREFIX_Draw` makes the same draw as every engine. Its
+    ///   member `attempts` is how many candidates that took, 0 where it failed; the rest is for the functions below.
+    ///   `PREFIX_draw_in(stream, seed, index)` makes that of a [`Stream`] by its number.
+    /// - for spectra, `PREFIX_at(draw, band) -> f32` and `PREFIX_spectrum(draw) -> array<f32, bands>`;
+    /// - for weights, `PREFIX_weights(draw) -> array<f32, components>`;
+    /// - for XYZ and sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_srgb`;
+    /// - for LRV and intensity, `PREFIX_lrv(draw) -> f32` and `PREFIX_intensity`.
+    ///
+    /// The module needs no optional feature. To import it with `naga_oil`, put a line `#define_import_path NAME` before
+    /// it, as `spectroll shader --naga-oil` does.
+    ///
+    /// ```
+    /// use spectroll::{Model, Quantity, Recipe};
+    ///
+    /// let recipe = Recipe::new(&Model::builtin("granada")?).quantities([Quantity::Srgb]).build()?;
+    /// assert!(recipe.wgsl("lamp")?.contains("fn lamp_srgb(d: lamp_Draw) -> vec3<f32>"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn wgsl(&self, prefix: &str) -> Result<String, TextError> {
+        wgsl::module(&self.program, prefix)
     }
 
     pub(crate) fn program(&self) -> &Program {
@@ -117,7 +197,67 @@ impl Recipe {
     }
 }
 
+/// One draw. See [`Recipe::draw`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn<R> {
+    tally: Tally,
+    values: Vec<(Quantity, Vec<R>)>,
+}
+
+impl<R> Drawn<R> {
+    /// What it took.
+    pub fn tally(&self) -> Tally {
+        self.tally
+    }
+
+    /// The values of a quantity, all 0 where the draw failed. None for [`Quantity::Attempts`], which
+    /// [`Drawn::tally`] has, nor for what the recipe does not ask for.
+    pub fn values(&self, quantity: Quantity) -> &[R] {
+        self.values.iter().find(|(q, _)| *q == quantity).map_or(&[], |(_, values)| values)
+    }
+
+    /// The spectrum, a value for each band, if the recipe asks for it.
+    pub fn spectrum(&self) -> &[R] {
+        self.values(Quantity::Spectra)
+    }
+}
+
 impl RecipeBuilder {
+    /// What comes out, besides nothing: unless said, [`Quantity::Spectra`]. Engines add [`Quantity::Attempts`].
+    pub fn quantities(mut self, quantities: impl IntoIterator<Item = Quantity>) -> Self {
+        self.outputs.quantities = quantities.into_iter().collect();
+        self
+    }
+
+    /// How quantities with several values a draw are ordered ([`Layout::Rows`]).
+    pub fn layout(mut self, layout: Layout) -> Self {
+        self.outputs.layout = layout;
+        self
+    }
+
+    /// Spectra in 16 bits, rounded to nearest and ties to even; other quantities stay in 32.
+    pub fn half_spectra(mut self) -> Self {
+        self.outputs.spectra = Element::F16;
+        self
+    }
+
+    /// The illuminant under which reflectances have their XYZ and sRGB (D65): its power in each band, in any unit.
+    pub fn light(mut self, power: &[f64]) -> Self {
+        self.outputs.light = Some(power.to_vec());
+        self
+    }
+
+    /// The scale of an illuminant's XYZ and sRGB ([`Luminance::Absolute`]).
+    pub fn luminance(mut self, luminance: Luminance) -> Self {
+        self.outputs.luminance = luminance;
+        self
+    }
+
+    /// Multiplies illuminants.
+    pub fn intensity(self, intensity: Intensity) -> Self {
+        RecipeBuilder { intensity: Some(intensity), ..self }
+    }
+
     /// Scales every draw to a luminous reflectance value (LRV, 0 to 1), eq. 9 and 10.
     pub fn lrv(self, lrv: f64) -> Self {
         RecipeBuilder { lrv: Some(lrv), ..self }
@@ -148,8 +288,18 @@ impl RecipeBuilder {
             return Err(RecipeError::MaxAttempts(self.max_attempts));
         }
         let target = self.lrv.map(|lrv| self.target(lrv)).transpose()?;
-        let program = Program::new(&self.model, self.covariance_scale, target, self.max_attempts);
+        let mut program = Program {
+            target,
+            max_attempts: self.max_attempts,
+            ..Program::new(&self.model, self.covariance_scale)
+        };
+        let mut asked = self.outputs.clone();
+        if let Some(intensity) = self.intensity {
+            program = self.brighten(program, intensity)?;
+            asked.fixed = if let Intensity::Fixed(value) = intensity { Some(value) } else { None };
+        }
         check_scale(&program)?;
+        program.outputs = outputs(&asked, &self.model, &program, self.covariance_scale)?;
         if let Some(target) = &program.target {
             let largest = region::largest_lrv(&program, &target.weights);
             if let Some(largest) = largest.filter(|&largest| target.lrv >= largest) {
@@ -165,6 +315,31 @@ impl RecipeBuilder {
             return Err(RecipeError::Hopeless { acceptance, max_attempts: self.max_attempts });
         }
         Ok(Recipe { model: self.model, program, acceptance })
+    }
+
+    fn brighten(&self, program: Program, intensity: Intensity) -> Result<Program, RecipeError> {
+        if self.model.kind() == Kind::Reflectance {
+            return Err(RecipeError::IntensityOfReflectance);
+        }
+        let check = |value: f64| match (1e-30..1e30).contains(&value) {
+            true => Ok(value),
+            false => Err(RecipeError::Intensity(value)),
+        };
+        let level = match intensity {
+            Intensity::Fixed(value) => return Ok(program.brightened(check(value)?)),
+            Intensity::LogUniform(low, high) => {
+                let octaves = (check(high)? / check(low)?).log2();
+                if !(octaves > 0.0 && octaves <= 126.0) {
+                    return Err(RecipeError::IntensityRange { low, high });
+                }
+                Level::LogUniform { low, octaves }
+            }
+            Intensity::Data => match self.model.parts().powers.as_slice() {
+                [] => return Err(RecipeError::NoPowers),
+                powers => Level::OneOf(powers.iter().map(|&p| check(p)).collect::<Result<_, _>>()?),
+            },
+        };
+        Ok(Program { level: Some(level), ..program })
     }
 
     fn target(&self, lrv: f64) -> Result<Target, RecipeError> {
@@ -183,7 +358,8 @@ impl RecipeBuilder {
 /// Numbers must survive rounding to f32, with room for sums and for a scale of 10^6 either way.
 fn check_scale(program: &Program) -> Result<(), RecipeError> {
     let largest = |values: &[f64]| values.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
-    let largest = program.gain.iter().map(|gain| largest(gain)).fold(largest(&program.offset), f64::max);
+    let Affine { offset, gain } = &program.spectrum;
+    let largest = gain.iter().map(|gain| largest(gain)).fold(largest(offset), f64::max);
     if (1e-30..1e30).contains(&largest) { Ok(()) } else { Err(RecipeError::Scale(largest)) }
 }
 
@@ -191,11 +367,8 @@ fn check_scale(program: &Program) -> Result<(), RecipeError> {
 fn pilot(program: &Program) -> f64 {
     let kernel = Kernel::<f64>::new(program);
     let stream = Stream::named(0, "pilot");
-    let accepted = (0..PILOT).into_par_iter().map_init(
-        || vec![0.0; program.bands()],
-        |spectrum, index| kernel.candidate(|block| stream.block(index, 0, block), spectrum).is_some(),
-    );
-    accepted.filter(|&accepted| accepted).count() as f64 / PILOT as f64
+    let accepted = (0..PILOT).into_par_iter().filter(|&index| kernel.accepts(|b| stream.block(index, 0, b)));
+    accepted.count() as f64 / PILOT as f64
 }
 
 /// The probability that none of `attempts` candidates is accepted.
@@ -233,11 +406,13 @@ fn nanometres(wavelengths: &[f64]) -> String {
 /// ```
 impl<R: Real> Distribution<Vec<R>> for Recipe {
     fn sample<G: Rng + ?Sized>(&self, rng: &mut G) -> Vec<R> {
-        let kernel = Kernel::new(&self.program);
-        let mut spectrum = vec![R::ZERO; self.program.bands()];
+        let kernel = Kernel::new(&self.program.spectra_alone());
         // A recipe that could loop here for long could not be built.
-        while kernel.candidate(|_| [(); 4].map(|()| rng.next_u32()), &mut spectrum).is_none() {}
-        spectrum
+        loop {
+            if let Some(mut values) = kernel.candidate(|_| [(); 4].map(|()| rng.next_u32())) {
+                return values.swap_remove(0);
+            }
+        }
     }
 }
 
@@ -294,7 +469,8 @@ mod tests {
     #[test]
     fn the_first_draw_stays_what_it_is() {
         let recipe = Recipe::new(&Model::builtin("munsell-vrhel").unwrap()).build().unwrap();
-        let (spectrum, tally) = recipe.draw::<f32>(Stream::new(1), 0);
+        let drawn = recipe.draw::<f32>(Stream::new(1), 0);
+        let (spectrum, tally) = (drawn.spectrum(), drawn.tally());
         let ends = [spectrum[0], spectrum[15], spectrum[30]].map(f32::to_bits);
         assert_eq!((ends, tally.attempts(), tally.above_one()), (FIRST, 1, false));
     }

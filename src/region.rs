@@ -58,9 +58,9 @@ pub(crate) fn blocking_bands(program: &Program) -> Option<Vec<usize>> {
 pub(crate) fn largest_lrv(program: &Program, weights: &[f64]) -> Option<f64> {
     let mut problem = Problem::new(OptimizationDirection::Maximize);
     let lrv_of = |values: &[f64]| values.iter().zip(weights).map(|(v, w)| v * w).sum::<f64>();
-    let tau = problem.add_var(lrv_of(&program.offset), (0.0, f64::INFINITY));
-    let mut columns = vec![(tau, program.offset.as_slice())];
-    for gain in program.gain.iter().filter(|gain| gain.iter().any(|&g| g != 0.0)) {
+    let tau = problem.add_var(lrv_of(&program.spectrum.offset), (0.0, f64::INFINITY));
+    let mut columns = vec![(tau, program.spectrum.offset.as_slice())];
+    for gain in program.spectrum.gain.iter().filter(|gain| gain.iter().any(|&g| g != 0.0)) {
         columns.push((problem.add_var(lrv_of(gain), (f64::NEG_INFINITY, f64::INFINITY)), gain));
     }
     for band in 0..program.bands() {
@@ -83,26 +83,27 @@ struct Row {
 }
 
 fn rows(program: &Program) -> Vec<Row> {
-    let gains = |band: usize| program.gain.iter().map(move |gain| gain[band]);
+    let gains = |band: usize| program.spectrum.gain.iter().map(move |gain| gain[band]);
     let mut rows = Vec::new();
     let mut push = |band, coefficients: Vec<f64>, room| {
         let norm = coefficients.iter().map(|c| c * c).sum::<f64>().sqrt();
         rows.push(Row { band, coefficients, norm, room });
     };
     for band in 0..program.bands() {
-        push(band, gains(band).map(|g| -g).collect(), program.offset[band]); // s > 0
+        push(band, gains(band).map(|g| -g).collect(), program.spectrum.offset[band]); // s > 0
         if program.kind == Kind::Reflectance && program.tests_base() {
-            push(band, gains(band).collect(), 1.0 - program.offset[band]); // s < 1
+            push(band, gains(band).collect(), 1.0 - program.spectrum.offset[band]); // s < 1
         }
     }
     if let Some(target) = program.target.as_ref().filter(|t| t.bounds != Bounds::Base) {
         let lrv_of = |values: &[f64]| values.iter().zip(&target.weights).map(|(v, w)| v * w).sum::<f64>();
-        let (lrv_offset, lrv_gain) = (lrv_of(&program.offset), program.gain.iter().map(|g| lrv_of(g)));
+        let (lrv_offset, lrv_gain) =
+            (lrv_of(&program.spectrum.offset), program.spectrum.gain.iter().map(|g| lrv_of(g)));
         let lrv_gain: Vec<f64> = lrv_gain.collect();
         for band in 0..program.bands() {
             // target . s < LRV(s)
             let coefficients = gains(band).zip(&lrv_gain).map(|(g, l)| target.lrv * g - l).collect();
-            push(band, coefficients, lrv_offset - target.lrv * program.offset[band]);
+            push(band, coefficients, lrv_offset - target.lrv * program.spectrum.offset[band]);
         }
     }
     rows
@@ -119,30 +120,36 @@ mod tests {
     use super::*;
     use crate::colorimetry::lrv_weights;
     use crate::model::Model;
-    use crate::program::Target;
+    use crate::program::{Affine, Target};
 
     /// Reflectances of 3 bands that vary in one shape: 0.5 + 0.1 z, 0.5 + 0.2 z, 0.5 - 0.1 z.
     fn ramp(target: Option<(f64, Bounds)>) -> Program {
+        let target = target.map(|(lrv, bounds)| Target { lrv, weights: vec![0.25, 0.5, 0.25], bounds });
+        Program { target, ..varying(vec![0.5; 3], vec![0.1, 0.2, -0.1]) }
+    }
+
+    /// Reflectances that vary in one shape.
+    fn varying(offset: Vec<f64>, shape: Vec<f64>) -> Program {
         Program {
             kind: Kind::Reflectance,
-            offset: vec![0.5; 3],
-            gain: vec![vec![0.1, 0.2, -0.1]],
-            target: target.map(|(lrv, bounds)| Target { lrv, weights: vec![0.25, 0.5, 0.25], bounds }),
+            spectrum: Affine { offset, gain: vec![shape] },
+            target: None,
+            level: None,
             max_attempts: 1,
+            outputs: Vec::new(),
         }
     }
 
     #[test]
     fn room_and_no_room() {
         assert_eq!(blocking_bands(&ramp(None)), None);
-        let above = Program { offset: vec![0.5, 1.5, 1.5], ..ramp(None) };
+        let above = varying(vec![0.5, 1.5, 1.5], vec![0.1, 0.2, -0.1]);
         assert_eq!(blocking_bands(&above), Some(vec![1, 2]), "one needs z < -2.5, the other z > 5");
-        let constant = Program { offset: vec![0.5, -0.1, 0.5], gain: vec![vec![0.0; 3]], ..ramp(None) };
+        let constant = varying(vec![0.5, -0.1, 0.5], vec![0.0; 3]);
         assert_eq!(blocking_bands(&constant), Some(vec![1]));
-        let touching =
-            Program { offset: vec![0.0, 0.5, 1.0], gain: vec![vec![-0.1, 0.0, 0.1]], ..ramp(None) };
+        let touching = varying(vec![0.0, 0.5, 1.0], vec![-0.1, 0.0, 0.1]);
         assert_eq!(blocking_bands(&touching), None, "z < 0 is room");
-        let pinched = Program { offset: vec![0.0, 0.5, 1.0], gain: vec![vec![0.1, 0.0, 0.1]], ..ramp(None) };
+        let pinched = varying(vec![0.0, 0.5, 1.0], vec![0.1, 0.0, 0.1]);
         assert_eq!(blocking_bands(&pinched), Some(vec![0, 2]), "z > 0 and z < 0");
     }
 
@@ -152,7 +159,8 @@ mod tests {
         let program = ramp(Some((0.9, Bounds::Scaled)));
         let largest = |p: &Program| largest_lrv(p, &p.target.as_ref().unwrap().weights).unwrap();
         assert!((largest(&program) - 1.0).abs() < 1e-6);
-        let tilted = Program { offset: vec![0.25, 0.5, 0.5], ..program };
+        let tilted =
+            Program { target: program.target, ..varying(vec![0.25, 0.5, 0.5], vec![0.1, 0.2, -0.1]) };
         let by_search = (-5000..5000)
             .map(|i| i as f64 * 1e-3)
             .map(|z| [0.25 + 0.1 * z, 0.5 + 0.2 * z, 0.5 - 0.1 * z])
@@ -166,7 +174,7 @@ mod tests {
     fn the_largest_lrv_of_munsell_and_vrhel() {
         let model = Model::builtin("munsell-vrhel").unwrap();
         let weights = lrv_weights(model.grid()).unwrap();
-        let largest = largest_lrv(&Program::new(&model, 1.0, None, 1), &weights).unwrap();
+        let largest = largest_lrv(&Program::new(&model, 1.0), &weights).unwrap();
         assert!((largest - 0.995928).abs() < 1e-6, "{largest}");
     }
 }

@@ -4,15 +4,11 @@
 use bytemuck::{Pod, Zeroable};
 use wgpu::{BufferUsages, Device};
 
+use crate::program::Program;
+use crate::quantity::{Format, Quantity};
 use crate::recipe::Recipe;
 use crate::stream::{self, Draws};
-use crate::wgsl::{self, Form, Target};
-
-/// The bindings of `shaders/main.wgsl`, `shaders/parameters.wgsl` and `shaders/looped.wgsl`.
-const PARAMETERS: u32 = 0;
-const SPECTRA: u32 = 1;
-const TALLIES: u32 = 2;
-const MODEL: u32 = 3;
+use crate::wgsl::{self, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Target};
 
 /// A recipe's compute pipeline on a wgpu device, to be recorded into its host's command encoders.
 ///
@@ -21,30 +17,31 @@ const MODEL: u32 = 3;
 /// `SHADER_INT64` it multiplies in 64 bits.
 ///
 /// ```
-/// use spectroll::{Model, Recipe, Sampler, Stream, wgpu};
+/// use spectroll::{Model, Quantity, Recipe, Sampler, Stream, wgpu};
 ///
 /// # fn host() -> Option<(wgpu::Device, wgpu::Queue)> { None }
 /// # let Some((device, queue)) = host() else { return Ok(()) };
-/// let recipe = Recipe::new(&Model::builtin("munsell-vrhel")?).build()?;
-/// let sampler = Sampler::new(&device, &recipe);
+/// let recipe = Recipe::new(&Model::builtin("munsell-vrhel")?).quantities([Quantity::Xyz]).build()?;
+/// let sampler = Sampler::new(&device, &recipe)?;
 /// let draws = sampler.prepare(&device, Stream::new(1).draws(0..4096))?;
 ///
 /// let mut encoder = device.create_command_encoder(&Default::default());
-/// draws.record(&mut encoder); // any pass of the host after this may bind draws.spectra()
+/// draws.record(&mut encoder); // any pass of the host after this may bind draws.buffer(Quantity::Xyz)
 /// queue.submit([encoder.finish()]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Sampler {
     pipeline: wgpu::ComputePipeline,
-    /// The model's numbers, where the shader reads them from a buffer.
-    model: Option<wgpu::Buffer>,
-    bands: u32,
+    /// The numbers that the shader reads from a buffer, where it does.
+    tables: Option<wgpu::Buffer>,
+    /// What comes out.
+    formats: Vec<Format>,
     max_attempts: u32,
     draws_per_thread: u32,
 }
 
-/// Why a range cannot be drawn in one dispatch.
+/// Why something cannot be drawn on a device, or not in one dispatch.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -53,6 +50,11 @@ pub enum SamplerError {
         "a range of {count} draws, of which this device takes at most {largest} at once ({limit}): split the range"
     )]
     TooMany { count: u64, largest: u64, limit: &'static str },
+    #[error(
+        "{buffers} storage buffers, of which this device binds at most {largest} to a shader \
+         (max_storage_buffers_per_shader_stage): ask for fewer quantities at once"
+    )]
+    TooManyBuffers { buffers: u32, largest: u32 },
 }
 
 /// What the shader reads as `Parameters`.
@@ -64,17 +66,27 @@ struct Parameters {
     count: u32,
     stream: u32,
     max_attempts: u32,
-    padding: u32,
+    plane: u32,
 }
 
 impl Sampler {
     /// Compiles the shader of a recipe. Errors of the device reach its host's error scopes and handlers.
-    pub fn new(device: &Device, recipe: &Recipe) -> Sampler {
-        let program = recipe.program();
+    pub fn new(device: &Device, recipe: &Recipe) -> Result<Sampler, SamplerError> {
+        Sampler::of(device, recipe.program())
+    }
+
+    /// Compiles the shader of a program.
+    pub(crate) fn of(device: &Device, program: &Program) -> Result<Sampler, SamplerError> {
         let target = target(device);
+        let (text, tables) = wgsl::shader(program, target);
+        let buffers = program.outputs.len() as u32 + u32::from(!tables.values.is_empty());
+        let largest = device.limits().max_storage_buffers_per_shader_stage;
+        if buffers > largest {
+            return Err(SamplerError::TooManyBuffers { buffers, largest });
+        }
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("spectroll"),
-            source: wgpu::ShaderSource::Wgsl(wgsl::shader(program, target).into()),
+            source: wgpu::ShaderSource::Wgsl(text.into()),
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("spectroll"),
@@ -84,17 +96,22 @@ impl Sampler {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
-        let model = (Form::of(program) == Form::Looped).then(|| {
-            let numbers = wgsl::model_buffer(program);
-            filled_buffer(device, "spectroll model", BufferUsages::STORAGE, bytemuck::cast_slice(&numbers))
+        let tables = (!tables.values.is_empty()).then(|| {
+            let bytes = bytemuck::cast_slice(&tables.values);
+            filled_buffer(device, "spectroll tables", BufferUsages::STORAGE, bytes)
         });
-        Sampler {
+        Ok(Sampler {
             pipeline,
-            model,
-            bands: program.bands() as u32,
+            tables,
+            formats: program.outputs.iter().map(|output| output.format).collect(),
             max_attempts: program.max_attempts,
             draws_per_thread: wgsl::draws_per_thread(program, target),
-        }
+        })
+    }
+
+    /// What comes out, in the order of [`Quantity`], and how it lies in its buffer.
+    pub fn formats(&self) -> &[Format] {
+        &self.formats
     }
 
     /// The most draws that one dispatch can make under these limits.
@@ -104,14 +121,15 @@ impl Sampler {
 
     /// That, and the name of what limits it.
     fn limit(&self, limits: &wgpu::Limits) -> (u64, &'static str) {
-        let row = 4 * u64::from(self.bands);
+        // Four draws, for which padding comes to nothing.
+        let four = self.formats.iter().map(|format| format.bytes(4)).max().expect("something comes out");
+        let values = self.formats.iter().map(|format| format.values(4)).max().expect("something comes out");
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(wgsl::WORKGROUP);
-        let even = |count: u64| count / 2 * 2; // buffers have room for an even number of draws
         [
-            (even(limits.max_storage_buffer_binding_size / row), "max_storage_buffer_binding_size"),
-            (even(limits.max_buffer_size / row), "max_buffer_size"),
+            (4 * (limits.max_storage_buffer_binding_size / four), "max_storage_buffer_binding_size"),
+            (4 * (limits.max_buffer_size / four), "max_buffer_size"),
             (threads * u64::from(self.draws_per_thread), "max_compute_workgroups_per_dimension"),
-            (u64::from(u32::MAX / self.bands / 2 * 2), "32-bit offsets"),
+            (4 * (u64::from(u32::MAX) / values), "32-bit offsets"),
         ]
         .into_iter()
         .min()
@@ -134,26 +152,27 @@ impl Sampler {
         if draws.count > largest {
             return Err(SamplerError::TooMany { count: draws.count, largest, limit });
         }
-        let capacity = draws.count.max(1).next_multiple_of(2);
-        let storage = |label, size| {
-            let usage = BufferUsages::STORAGE | usage;
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-            device.create_buffer(&descriptor)
+        let capacity = draws.count.max(1).next_multiple_of(u64::from(self.draws_per_thread));
+        let output = |format: &Format| {
+            let label = format!("spectroll {}", format.quantity);
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(&label),
+                size: format.bytes(capacity).next_multiple_of(4),
+                usage: BufferUsages::STORAGE | usage,
+                mapped_at_creation: false,
+            })
         };
-        let spectra = storage("spectroll spectra", capacity * 4 * u64::from(self.bands));
-        let tallies = storage("spectroll tallies", capacity * 4);
+        let outputs: Vec<_> = self.formats.iter().map(output).collect();
         let parameters = filled_buffer(
             device,
             "spectroll parameters",
             BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             bytemuck::bytes_of(&self.parameters(draws)),
         );
-        let bound = [(PARAMETERS, Some(&parameters)), (SPECTRA, Some(&spectra)), (TALLIES, Some(&tallies))];
-        let entries: Vec<_> = bound
-            .into_iter()
-            .chain([(MODEL, self.model.as_ref())])
-            .filter_map(|(binding, buffer)| Some((binding, buffer?)))
+        let at = |format: &Format| OUTPUTS_AT + format.quantity as u32;
+        let entries: Vec<_> = std::iter::once((PARAMETERS_AT, &parameters))
+            .chain(self.tables.iter().map(|tables| (TABLES_AT, tables)))
+            .chain(self.formats.iter().map(at).zip(&outputs))
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -161,14 +180,7 @@ impl Sampler {
             layout: &self.pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        Ok(Prepared {
-            sampler: self.clone(),
-            bindings,
-            parameters,
-            spectra,
-            tallies,
-            count: draws.count as u32,
-        })
+        Ok(Prepared { sampler: self.clone(), bindings, parameters, outputs, count: draws.count })
     }
 
     fn parameters(&self, draws: Draws) -> Parameters {
@@ -178,7 +190,7 @@ impl Sampler {
             count: draws.count as u32, // `limit` keeps it below 2^32
             stream: draws.stream.id() << 8,
             max_attempts: self.max_attempts,
-            padding: 0,
+            plane: draws.count.next_multiple_of(4) as u32,
         }
     }
 }
@@ -189,9 +201,9 @@ pub struct Prepared {
     sampler: Sampler,
     bindings: wgpu::BindGroup,
     parameters: wgpu::Buffer,
-    spectra: wgpu::Buffer,
-    tallies: wgpu::Buffer,
-    count: u32,
+    /// In the order of the sampler's formats.
+    outputs: Vec<wgpu::Buffer>,
+    count: u64,
 }
 
 impl Prepared {
@@ -202,27 +214,29 @@ impl Prepared {
         pass.set_pipeline(&self.sampler.pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
         let draws_per_workgroup = wgsl::WORKGROUP * self.sampler.draws_per_thread;
-        pass.dispatch_workgroups(self.count.div_ceil(draws_per_workgroup), 1, 1);
+        pass.dispatch_workgroups((self.count as u32).div_ceil(draws_per_workgroup), 1, 1);
     }
 
-    /// The spectra once the pass has run: an f32 for each draw and band, draw by draw, without padding. The buffer
-    /// may be longer by one draw. A draw that failed (see [`Prepared::tallies`]) is all zeros.
-    pub fn spectra(&self) -> &wgpu::Buffer {
-        &self.spectra
+    /// The values of a quantity once the pass has run, as [`Prepared::formats`] says they lie; `None` if the recipe
+    /// does not ask for it. The buffer may be longer. A draw that failed, which [`Quantity::Attempts`] tells, is 0.
+    pub fn buffer(&self, quantity: Quantity) -> Option<&wgpu::Buffer> {
+        let position = self.formats().iter().position(|format| format.quantity == quantity)?;
+        Some(&self.outputs[position])
     }
 
-    /// A [`Tally`](crate::Tally) for each draw once the pass has run. The buffer may be longer by one.
-    pub fn tallies(&self) -> &wgpu::Buffer {
-        &self.tallies
+    /// What comes out, and how it lies in the buffers. Planes are `count` draws apart, rounded up to a multiple of 4.
+    pub fn formats(&self) -> &[Format] {
+        &self.sampler.formats
     }
 
-    pub(crate) fn bands(&self) -> usize {
-        self.sampler.bands as usize
+    /// The buffers, in the order of the formats.
+    pub(crate) fn buffers(&self) -> &[wgpu::Buffer] {
+        &self.outputs
     }
 
     /// Turns to other draws, no more than were prepared, in what the queue runs from its next submission on.
     pub(crate) fn turn_to(&mut self, queue: &wgpu::Queue, draws: Draws) {
-        self.count = draws.count as u32;
+        self.count = draws.count;
         queue.write_buffer(&self.parameters, 0, bytemuck::bytes_of(&self.sampler.parameters(draws)));
     }
 }

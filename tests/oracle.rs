@@ -46,12 +46,12 @@ enum Difference {
 }
 
 fn difference(recipe: &Recipe, stream: Stream, index: u64) -> Difference {
-    let ((ours, our_tally), (exact, tally)) =
-        (recipe.draw::<f32>(stream, index), recipe.draw::<f64>(stream, index));
-    if our_tally.attempts() != tally.attempts() {
+    let (ours, exact) = (recipe.draw::<f32>(stream, index), recipe.draw::<f64>(stream, index));
+    if ours.tally().attempts() != exact.tally().attempts() {
         return Difference::Flip;
     }
-    let errors = ours.iter().zip(&exact).map(|(&a, b)| (f64::from(a) - b).abs());
+    let (ours, exact) = (ours.spectrum(), exact.spectrum());
+    let errors = ours.iter().zip(exact).map(|(&a, b)| (f64::from(a) - b).abs());
     Difference::Error(errors.fold(0.0, f64::max), exact.iter().copied().fold(0.0, f64::max))
 }
 

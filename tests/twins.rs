@@ -87,8 +87,8 @@ struct Rows {
 fn rows(engine: &Engine, recipe: &Recipe, draws: Draws) -> Rows {
     let mut rows = Rows { spectra: Vec::new(), tallies: Vec::new() };
     let made = engine.draw(recipe, draws, |batch| {
-        rows.spectra.extend_from_slice(batch.spectra);
-        rows.tallies.extend_from_slice(batch.tallies);
+        rows.spectra.extend_from_slice(batch.spectra());
+        rows.tallies.extend_from_slice(batch.tallies());
         Ok::<_, EngineError>(())
     });
     let summary = made.unwrap_or_else(|e| panic!("{engine}: {e}"));
@@ -151,8 +151,9 @@ fn assert_twins(case: &Case, draws: Draws) -> Rows {
     assert_valid(case, &theirs);
     let bands = case.recipe.model().bands();
     for i in (0..ours.tallies.len()).step_by(draws.count.div_ceil(5000).max(1) as usize) {
-        let (row, tally) = case.recipe.draw::<f32>(draws.stream, draws.first.wrapping_add(i as u64));
-        assert_eq!((row.as_slice(), tally), (&ours.spectra[i * bands..(i + 1) * bands], ours.tallies[i]));
+        let drawn = case.recipe.draw::<f32>(draws.stream, draws.first.wrapping_add(i as u64));
+        let row = &ours.spectra[i * bands..(i + 1) * bands];
+        assert_eq!((drawn.spectrum(), drawn.tally()), (row, ours.tallies[i]));
     }
     ours
 }
@@ -277,8 +278,10 @@ fn the_tolerance_for_hardware_is_neither_tight_nor_loose() {
     for case in targets.map(|target| Case::new(&builtin("munsell-vrhel"), target, 1.0)) {
         let draws = Stream::new(10).draws(0..20_000);
         let ours = rows(&cpu(), &case.recipe, draws);
-        let (spectra, tallies): (Vec<_>, Vec<_>) =
-            (0..draws.count).map(|i| case.recipe.draw::<f64>(draws.stream, i)).unzip();
+        let (spectra, tallies): (Vec<_>, Vec<_>) = (0..draws.count)
+            .map(|i| case.recipe.draw::<f64>(draws.stream, i))
+            .map(|drawn| (drawn.spectrum().to_vec(), drawn.tally()))
+            .unzip();
         let oracle = Rows { spectra: spectra.concat().iter().map(|&s| s as f32).collect(), tallies };
         assert_eq!(compare(&case, draws, &ours, &oracle, false), Ok(()));
         let mut off = oracle.clone();

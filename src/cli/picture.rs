@@ -125,7 +125,9 @@ impl Picture<'_> {
 
     fn draws(&self) -> Vec<Vec<f64>> {
         let stream = Stream::new(self.seed);
-        self.recipe.map_or_else(Vec::new, |recipe| (0..DRAWS).map(|i| recipe.draw(stream, i).0).collect())
+        self.recipe.map_or_else(Vec::new, |recipe| {
+            (0..DRAWS).map(|i| recipe.draw(stream, i).spectrum().to_vec()).collect()
+        })
     }
 
     /// The mean, and how far spectra of the model lie from it.

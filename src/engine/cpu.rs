@@ -5,30 +5,30 @@ use std::time::Instant;
 
 use super::{Batch, EngineError, Pace};
 use crate::cpu::{self, Kernel};
-use crate::program::Tally;
+use crate::quantity::Format;
 use crate::recipe::Recipe;
 use crate::stream::Draws;
 
 /// How many windows there are: one with the caller, one being computed, one between them.
 const WINDOWS: usize = 3;
 
-#[derive(Default)]
-struct Window {
-    spectra: Vec<f32>,
-    tallies: Vec<Tally>,
-}
+/// The words of each output.
+type Window = Vec<Vec<u32>>;
 
 pub(super) struct Drawer<'a> {
     pool: &'a rayon::ThreadPool,
     recipe: &'a Recipe,
     kernel: Kernel<f32>,
+    formats: Vec<Format>,
     /// Windows that were used before: memory that the system has given already.
     windows: Vec<Window>,
 }
 
 impl<'a> Drawer<'a> {
     pub(super) fn new(pool: &'a rayon::ThreadPool, recipe: &'a Recipe) -> Self {
-        Drawer { pool, recipe, kernel: Kernel::new(recipe.program()), windows: Vec::new() }
+        let program = recipe.program().tallied();
+        let formats = program.outputs.iter().map(|output| output.format).collect();
+        Drawer { pool, recipe, kernel: Kernel::new(&program), formats, windows: Vec::new() }
     }
 
     pub(super) fn draw<E: From<EngineError>>(
@@ -38,18 +38,18 @@ impl<'a> Drawer<'a> {
     ) -> Result<(), E> {
         let (full, filled) = sync_channel(WINDOWS);
         let (empty, emptied) = sync_channel(WINDOWS);
-        self.windows.resize_with(WINDOWS, Window::default);
+        self.windows.resize_with(WINDOWS, || vec![Vec::new(); self.formats.len()]);
         for window in self.windows.drain(..) {
             empty.send(window).expect("there is room, and a receiver");
         }
-        let (kernel, pace) = (&self.kernel, Pace::new(self.recipe, u64::MAX));
-        let pool = self.pool;
+        let (pool, kernel, formats) = (self.pool, &self.kernel, &self.formats);
+        let pace = Pace::new(self.recipe, formats, u64::MAX);
         std::thread::scope(|scope| {
-            let computing = scope.spawn(move || compute(pool, kernel, pace, draws, emptied, full));
+            let computing = scope.spawn(move || compute(pool, kernel, formats, pace, draws, emptied, full));
             // Dropped before the thread is waited for, which might itself be waiting for a window.
             let empty = empty;
             for (part, window) in filled {
-                sink(Batch { draws: part, spectra: &window.spectra, tallies: &window.tallies })?;
+                sink(Batch::new(part, formats, window.iter().map(|words| bytemuck::cast_slice(words))))?;
                 let _ = empty.send(window); // nobody fills it after the last
             }
             let emptied = computing.join().expect("computing does not panic");
@@ -63,6 +63,7 @@ impl<'a> Drawer<'a> {
 fn compute(
     pool: &rayon::ThreadPool,
     kernel: &Kernel<f32>,
+    formats: &[Format],
     mut pace: Pace,
     draws: Draws,
     emptied: Receiver<Window>,
@@ -72,9 +73,10 @@ fn compute(
     while let Some(part) = pace.window(draws, offset) {
         let Ok(mut window) = emptied.recv() else { break };
         let start = Instant::now();
-        window.spectra.resize(part.count as usize * kernel.bands(), 0.0);
-        window.tallies.resize(part.count as usize, Tally::FAILED);
-        pool.install(|| cpu::fill(kernel, part, &mut window.spectra, &mut window.tallies));
+        for (format, words) in formats.iter().zip(&mut window) {
+            words.resize(format.bytes(part.count).div_ceil(4) as usize, 0);
+        }
+        pool.install(|| cpu::fill(kernel, part, &mut window));
         pace.learn(part.count, start);
         offset += part.count;
         if full.send((part, window)).is_err() {

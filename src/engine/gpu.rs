@@ -106,10 +106,10 @@ pub(super) struct Drawer<'a> {
 }
 
 impl<'a> Drawer<'a> {
-    pub(super) fn new(gpu: &'a Gpu, recipe: &Recipe) -> Self {
-        let sampler = Sampler::new(&gpu.device, recipe);
-        let pace = Pace::new(recipe, sampler.max_count(&gpu.device.limits()));
-        Drawer { gpu, sampler, pace, slots: Vec::new(), capacity: 0 }
+    pub(super) fn new(gpu: &'a Gpu, recipe: &Recipe) -> Result<Self, EngineError> {
+        let sampler = Sampler::of(&gpu.device, &recipe.program().tallied())?;
+        let pace = Pace::new(recipe, sampler.formats(), sampler.max_count(&gpu.device.limits()));
+        Ok(Drawer { gpu, sampler, pace, slots: Vec::new(), capacity: 0 })
     }
 
     pub(super) fn draw<E: From<EngineError>>(
@@ -157,8 +157,8 @@ impl<'a> Drawer<'a> {
 /// Buffers for one window.
 struct Slot {
     prepared: Prepared,
-    /// Copies of the spectra and the tallies that the host can map, where it cannot map the originals.
-    staging: Option<[wgpu::Buffer; 2]>,
+    /// Copies of the buffers that the host can map, where it cannot map the originals.
+    staging: Option<Vec<wgpu::Buffer>>,
 }
 
 /// A window that was submitted.
@@ -166,24 +166,23 @@ struct Flight {
     slot: Slot,
     draws: Draws,
     submission: wgpu::SubmissionIndex,
-    /// What mapping the spectra and the tallies came to.
-    mapped: [Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>; 2],
+    /// What mapping each buffer came to.
+    mapped: Vec<Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>>,
 }
 
 impl Slot {
     fn new(gpu: &Gpu, sampler: &Sampler, capacity: Draws) -> Result<Slot, EngineError> {
         let usage = if gpu.shared_memory { BufferUsages::MAP_READ } else { BufferUsages::COPY_SRC };
         let prepared = sampler.prepare_for(&gpu.device, capacity, usage)?;
-        let staging = (!gpu.shared_memory).then(|| {
-            [prepared.spectra(), prepared.tallies()].map(|buffer| {
-                gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some("spectroll staging"),
-                    size: buffer.size(),
-                    usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
-                    mapped_at_creation: false,
-                })
+        let copy = |buffer: &wgpu::Buffer| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("spectroll staging"),
+                size: buffer.size(),
+                usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
             })
-        });
+        };
+        let staging = (!gpu.shared_memory).then(|| prepared.buffers().iter().map(copy).collect());
         Ok(Slot { prepared, staging })
     }
 
@@ -192,49 +191,42 @@ impl Slot {
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("spectroll") };
         let mut encoder = gpu.device.create_command_encoder(&descriptor);
         self.prepared.record(&mut encoder);
-        if let Some([spectra, tallies]) = &self.staging {
-            encoder.copy_buffer_to_buffer(self.prepared.spectra(), 0, spectra, 0, None);
-            encoder.copy_buffer_to_buffer(self.prepared.tallies(), 0, tallies, 0, None);
+        for (from, to) in self.prepared.buffers().iter().zip(self.staging.iter().flatten()) {
+            encoder.copy_buffer_to_buffer(from, 0, to, 0, None);
         }
         let submission = gpu.queue.submit([encoder.finish()]);
-        let mapped = self.readable().map(|buffer| {
+        let map = |buffer: &wgpu::Buffer| {
             let state = Arc::new(OnceLock::new());
             let callback_state = state.clone();
             buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(callback_state.set(result)));
             state
-        });
+        };
+        let mapped = self.readable().iter().map(map).collect();
         Flight { slot: self, draws, submission, mapped }
     }
 
-    /// The spectra and the tallies, where the host maps them.
-    fn readable(&self) -> [&wgpu::Buffer; 2] {
-        match &self.staging {
-            Some([spectra, tallies]) => [spectra, tallies],
-            None => [self.prepared.spectra(), self.prepared.tallies()],
-        }
+    /// The buffers, where the host maps them.
+    fn readable(&self) -> &[wgpu::Buffer] {
+        self.staging.as_deref().unwrap_or(self.prepared.buffers())
     }
 }
 
 impl Flight {
-    /// Whether both buffers are mapped, or why one is not; `None` as long as that is open.
+    /// Whether all buffers are mapped, or why one is not; `None` as long as that is open.
     fn state(&self) -> Option<Result<(), wgpu::BufferAsyncError>> {
-        let [spectra, tallies] = self.mapped.each_ref().map(|state| state.get().cloned());
-        Some(spectra?.and(tallies?))
+        self.mapped.iter().map(|state| state.get().cloned()).collect()
     }
 
     /// Hands a window that has landed to `sink`.
     fn read<E>(self, sink: &mut impl FnMut(Batch) -> Result<(), E>) -> Result<Slot, E> {
-        let [spectra, tallies] = self.slot.readable();
+        let buffers = self.slot.readable();
         {
-            let count = self.draws.count as usize;
             let view = |buffer: &wgpu::Buffer| buffer.get_mapped_range(..).expect("it has landed");
-            let (spectra, tallies) = (view(spectra), view(tallies));
-            let tallies = &bytemuck::cast_slice(&tallies)[..count];
-            let values = self.slot.prepared.bands() * count;
-            sink(Batch { draws: self.draws, spectra: &bytemuck::cast_slice(&spectra)[..values], tallies })?;
+            let views: Vec<_> = buffers.iter().map(view).collect();
+            let arrays = views.iter().map(|view| &view[..]);
+            sink(Batch::new(self.draws, self.slot.prepared.formats(), arrays))?;
         }
-        spectra.unmap();
-        tallies.unmap();
+        buffers.iter().for_each(wgpu::Buffer::unmap);
         Ok(self.slot)
     }
 }

@@ -10,17 +10,19 @@ use std::fmt;
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
+use half::f16;
 use serde::Serialize;
 
 use adapter::Wanted;
 pub use adapter::{Adapter, adapters};
 
 use crate::program::Tally;
+use crate::quantity::{Element, Format, Layout, Quantity};
 use crate::recipe::Recipe;
 use crate::sampler::SamplerError;
 use crate::stream::Draws;
 
-/// The most bytes of spectra in one window: all windows in flight stay in a cache of 32 MiB.
+/// The most bytes of a quantity in one window: all windows in flight stay in a cache of 32 MiB.
 const WINDOW_BYTES: u64 = 8 << 20;
 
 /// How long a window should take: short enough for an interrupt and for any watchdog, long enough to hide the cost of
@@ -99,15 +101,15 @@ enum Device {
     Cpu(rayon::ThreadPool),
 }
 
-/// A window of draws, as they are handed to the caller.
+/// A window of draws, as they are handed to the caller: an array for each quantity that the recipe asks for, and
+/// tallies.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
     /// Which draws these are.
     pub draws: Draws,
-    /// Their spectra: a value for each draw and band, draw by draw.
-    pub spectra: &'a [f32],
-    /// What each took.
-    pub tallies: &'a [Tally],
+    formats: &'a [Format],
+    /// The bytes of each quantity.
+    arrays: [&'a [u8]; Quantity::ALL.len()],
 }
 
 /// What a range of draws took.
@@ -121,10 +123,57 @@ pub struct Summary {
     pub above_one: u64,
 }
 
-impl Batch<'_> {
-    /// The number of values in a spectrum.
-    pub fn bands(&self) -> usize {
-        self.spectra.len() / self.tallies.len()
+impl<'a> Batch<'a> {
+    /// A batch of arrays, in the order of the formats. They may be longer than they need be.
+    fn new(draws: Draws, formats: &'a [Format], arrays: impl IntoIterator<Item = &'a [u8]>) -> Batch<'a> {
+        let mut batch = Batch { draws, formats, arrays: [&[]; Quantity::ALL.len()] };
+        for (format, bytes) in formats.iter().zip(arrays) {
+            batch.arrays[format.quantity as usize] = &bytes[..format.bytes(draws.count) as usize];
+        }
+        batch
+    }
+
+    /// What there is, in the order of [`Quantity`], and how it lies in its array. Planes are
+    /// [`draws.count`](Batch::draws) apart, rounded up to a multiple of 4.
+    pub fn formats(&self) -> &'a [Format] {
+        self.formats
+    }
+
+    /// The bytes of a quantity, in this machine's order; none where the recipe does not ask for it.
+    pub fn bytes(&self, quantity: Quantity) -> &'a [u8] {
+        self.arrays[quantity as usize]
+    }
+
+    /// The values of a quantity in 32 bits, in the order of its [`Format`]; none where the recipe does not ask for it.
+    ///
+    /// # Panics
+    /// Where they are not [`Element::F32`]: half spectra, and attempts.
+    pub fn values(&self, quantity: Quantity) -> &'a [f32] {
+        let other = |f: &&Format| f.quantity == quantity && f.element != Element::F32;
+        if let Some(format) = self.formats.iter().find(other) {
+            panic!("the {quantity} are {:?}, not F32", format.element);
+        }
+        bytemuck::cast_slice(self.bytes(quantity))
+    }
+
+    /// The spectra: [`Batch::values`] of [`Quantity::Spectra`].
+    pub fn spectra(&self) -> &'a [f32] {
+        self.values(Quantity::Spectra)
+    }
+
+    /// The spectra of a recipe that asks for them in 16 bits.
+    ///
+    /// # Panics
+    /// Where they have 32.
+    pub fn half_spectra(&self) -> &'a [f16] {
+        let single = |f: &Format| f.quantity == Quantity::Spectra && f.element == Element::F32;
+        assert!(!self.formats.iter().any(single), "the spectra are F32, not F16");
+        bytemuck::cast_slice(self.bytes(Quantity::Spectra))
+    }
+
+    /// What each draw took.
+    pub fn tallies(&self) -> &'a [Tally] {
+        bytemuck::cast_slice(self.bytes(Quantity::Attempts))
     }
 }
 
@@ -135,13 +184,13 @@ impl Summary {
     }
 
     fn add(&mut self, batch: &Batch, max_attempts: u32) -> Result<(), EngineError> {
-        if let Some(failed) = batch.tallies.iter().position(|t| t.attempts() == 0) {
+        if let Some(failed) = batch.tallies().iter().position(|t| t.attempts() == 0) {
             let index = batch.draws.first.wrapping_add(failed as u64);
             return Err(EngineError::Exhausted { index, attempts: max_attempts });
         }
         self.draws += batch.draws.count;
-        self.attempts += batch.tallies.iter().map(|t| u64::from(t.attempts())).sum::<u64>();
-        self.above_one += batch.tallies.iter().filter(|t| t.above_one()).count() as u64;
+        self.attempts += batch.tallies().iter().map(|t| u64::from(t.attempts())).sum::<u64>();
+        self.above_one += batch.tallies().iter().filter(|t| t.above_one()).count() as u64;
         Ok(())
     }
 }
@@ -192,7 +241,7 @@ impl Engine {
     /// number of [`Drawer::draw`].
     pub fn drawer<'a>(&'a self, recipe: &'a Recipe) -> Result<Drawer<'a>, EngineError> {
         let way = match &self.device {
-            Device::Gpu(gpu) => Way::Gpu(gpu::Drawer::new(gpu, recipe)),
+            Device::Gpu(gpu) => Way::Gpu(gpu::Drawer::new(gpu, recipe)?),
             Device::Cpu(pool) => Way::Cpu(cpu::Drawer::new(pool, recipe)),
         };
         Ok(Drawer { recipe, way })
@@ -210,10 +259,16 @@ impl Engine {
     }
 
     /// Makes `draws` and returns their spectra: a value for each draw and band, draw by draw.
+    ///
+    /// # Panics
+    /// Where the recipe asks for them in 16 bits or in planes, which cannot be put end to end.
     pub fn collect(&self, recipe: &Recipe, draws: Draws) -> Result<Vec<f32>, EngineError> {
         let mut spectra = Vec::new();
         self.draw(recipe, draws, |batch| {
-            spectra.extend_from_slice(batch.spectra);
+            let rows =
+                |format: &Format| format.quantity != Quantity::Spectra || format.layout != Layout::Planes;
+            assert!(batch.formats().iter().all(rows), "spectra in planes cannot be put end to end");
+            spectra.extend_from_slice(batch.spectra());
             Ok::<_, EngineError>(())
         })?;
         Ok(spectra)
@@ -271,17 +326,18 @@ struct Pace {
 
 impl Pace {
     /// Windows of at most `most` draws. The first has about 10^5 candidates.
-    fn new(recipe: &Recipe, most: u64) -> Pace {
-        let most = most.min(WINDOW_BYTES / (4 * recipe.model().bands() as u64)).max(2);
-        Pace { next: ((recipe.acceptance() * 1e5) as u64).clamp(2, most), most }
+    fn new(recipe: &Recipe, formats: &[Format], most: u64) -> Pace {
+        let bytes = formats.iter().map(|format| format.bytes(4)).max().expect("something comes out");
+        let most = most.min(4 * (WINDOW_BYTES / bytes)).max(4);
+        Pace { next: ((recipe.acceptance() * 1e5) as u64).clamp(4, most), most }
     }
 
     /// Learns from a window of `count` draws that took until now from `start`.
     fn learn(&mut self, count: u64, start: Instant) {
         let ratio = WINDOW_TIME.as_secs_f64() / start.elapsed().as_secs_f64().max(1e-6);
         let wanted = count as f64 * ratio.clamp(0.25, 2.0);
-        // Even, so that no window leaves half a thread idle.
-        self.next = (wanted as u64).clamp(2, self.most) / 2 * 2;
+        // A multiple of 4, so that no window leaves half a thread idle and planes have no padding.
+        self.next = (wanted as u64).clamp(4, self.most) / 4 * 4;
     }
 
     /// The next window, of what is left from `offset` on.

@@ -11,7 +11,8 @@ pub(super) fn begin(to: &mut dyn Write, grid: Grid) -> io::Result<()> {
 }
 
 pub(super) fn write(to: &mut dyn Write, batch: &Batch) -> io::Result<()> {
-    let spectra = batch.spectra.chunks_exact(batch.bands());
+    let bands = batch.spectra().len() / batch.draws.count as usize;
+    let spectra = batch.spectra().chunks_exact(bands);
     lines(to, spectra.map(|spectrum| spectrum.iter().map(|value| value.to_string())))
 }
 

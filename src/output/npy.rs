@@ -17,7 +17,7 @@ pub(super) fn begin(to: &mut dyn Write, grid: Grid, count: u64) -> io::Result<()
 
 pub(super) fn write(to: &mut dyn Write, batch: &Batch) -> io::Result<()> {
     if cfg!(target_endian = "little") {
-        return to.write_all(bytemuck::cast_slice(batch.spectra));
+        return to.write_all(bytemuck::cast_slice(batch.spectra()));
     }
-    batch.spectra.iter().try_for_each(|value| to.write_all(&value.to_le_bytes()))
+    batch.spectra().iter().try_for_each(|value| to.write_all(&value.to_le_bytes()))
 }

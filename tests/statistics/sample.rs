@@ -104,7 +104,7 @@ impl<'a> Sample<'a> {
         let engine = Engine::new(&Choice::Cpu).expect("the CPU is always there");
         let mut draws = Vec::new();
         let made = engine.draw(&scenario.recipe(), stream.draws(first..first + count), |batch| {
-            let rows = batch.spectra.chunks_exact(batch.bands()).zip(batch.tallies);
+            let rows = batch.spectra().chunks_exact(scenario.model.bands()).zip(batch.tallies());
             draws.extend(rows.map(|(row, t)| (row.iter().map(|&s| f64::from(s)).collect(), t.attempts())));
             Ok::<_, EngineError>(())
         });
@@ -116,8 +116,8 @@ impl<'a> Sample<'a> {
     pub(crate) fn of_library(scenario: &'a Scenario, stream: Stream, first: u64, count: u64) -> Sample<'a> {
         let recipe = scenario.recipe();
         Sample::of(scenario, first, count, |index| {
-            let (spectrum, tally) = recipe.draw::<f64>(stream, index);
-            (spectrum, tally.attempts())
+            let drawn = recipe.draw::<f64>(stream, index);
+            (drawn.spectrum().to_vec(), drawn.tally().attempts())
         })
     }
 

@@ -1,0 +1,258 @@
+//! The arrays that draws go into, a column for each output, and the loop over all cores that fills them.
+
+use bytemuck::cast_slice_mut;
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::{Kernel, Value};
+use crate::program::Tally;
+use crate::quantity::{Element, Format, Layout};
+use crate::stream::Draws;
+
+/// How many lanes the f32 engine has: a vector register of AVX-512, two of AVX2.
+const LANES: usize = 16;
+
+/// How many draws a core takes at once, at most: enough that lanes which idle at the end do not count.
+const CHUNK: usize = 4096;
+
+/// The part of an array that some consecutive draws go into.
+struct Column<'a> {
+    format: Format,
+    /// That of each plane; of rows there is one. Words of 32 bits, whatever the values are.
+    planes: Vec<&'a mut [u32]>,
+}
+
+/// Makes all of `draws` in f32, in order, on all cores. Each array has the words of one output, and is as long as
+/// [`Format::bytes`] says. Padding is left as it is.
+pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [Vec<u32>]) {
+    let count = draws.count as usize;
+    let size = (count / (4 * rayon::current_num_threads())).clamp(8 * LANES, CHUNK).next_multiple_of(4);
+    let mut chunks: Vec<Vec<Column>> = (0..count.div_ceil(size)).map(|_| Vec::new()).collect();
+    for (output, words) in kernel.outputs.iter().zip(arrays) {
+        for (chunk, column) in chunks.iter_mut().zip(split(output.format, words, count, size)) {
+            chunk.push(column);
+        }
+    }
+    chunks.into_par_iter().enumerate().for_each(|(chunk, columns)| {
+        let first = chunk * size;
+        fill_chunk(kernel, draws.part(first as u64, size.min(count - first) as u64), columns);
+    });
+}
+
+/// The columns of each `size` draws, a multiple of 4.
+fn split(format: Format, words: &mut [u32], count: usize, size: usize) -> Vec<Column<'_>> {
+    let words_of = |values: usize| (values * format.element_bytes()).div_ceil(4);
+    let plane = words_of(format.values(count as u64) as usize / format.planes());
+    let mut columns: Vec<_> =
+        (0..count.div_ceil(size)).map(|_| Column { format, planes: Vec::new() }).collect();
+    for plane in words.chunks_mut(plane.max(1)) {
+        for (column, words) in columns.iter_mut().zip(plane.chunks_mut(words_of(size * format.stride()))) {
+            column.planes.push(words);
+        }
+    }
+    columns
+}
+
+// x86-64-v4 and v3, by what of them matters here; on other architectures the baseline has vectors (NEON).
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx2+bmi2+fma",
+    "x86_64+avx2+bmi2+fma"
+))]
+fn fill_chunk(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
+    fill_in_lanes::<LANES>(kernel, draws, columns);
+}
+
+#[inline(always)]
+fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws, mut columns: Vec<Column>) {
+    let widest = kernel.outputs.iter().map(|output| output.format.width).max().unwrap_or(0);
+    let mut row = vec![0.0; widest];
+    kernel.in_lanes::<L>(draws, |number, lane, candidates, tally| {
+        for ((output, column), maps) in kernel.outputs.iter().zip(&mut columns).zip(&candidates.maps) {
+            let values = match output.value {
+                Value::Tally => {
+                    column.planes[0][number] = bytemuck::cast(tally);
+                    continue;
+                }
+                Value::Spectrum => &candidates.spectrum,
+                Value::Map(..) => maps,
+                Value::Level => std::slice::from_ref(&candidates.scale),
+            };
+            column.put(number, values, lane, tally, &mut row);
+        }
+    });
+}
+
+impl Column<'_> {
+    /// Stores the values of a lane, zeros where the draw failed. `row` is for what is not stored as it is.
+    #[inline(always)]
+    fn put<const L: usize>(
+        &mut self,
+        number: usize,
+        values: &[[f32; L]],
+        lane: usize,
+        tally: Tally,
+        row: &mut [f32],
+    ) {
+        let (stride, width) = (self.format.stride(), self.format.width);
+        if self.format.layout != Layout::Planes && self.format.element == Element::F32 {
+            let row = cast_slice_mut(&mut self.planes[0][number * stride..][..width]);
+            return gather(values, lane, tally, row);
+        }
+        let row = &mut row[..width];
+        gather(values, lane, tally, row);
+        match (self.format.layout, self.format.element) {
+            (Layout::Planes, Element::F16) => {
+                for (plane, &value) in self.planes.iter_mut().zip(&*row) {
+                    cast_slice_mut::<_, f16>(plane)[number] = f16::from_f32(value);
+                }
+            }
+            (Layout::Planes, _) => {
+                for (plane, value) in self.planes.iter_mut().zip(&*row) {
+                    plane[number] = value.to_bits();
+                }
+            }
+            _ => {
+                let halves = cast_slice_mut::<_, f16>(self.planes[0]);
+                halves[number * stride..][..width].convert_from_f32_slice(row);
+            }
+        }
+    }
+}
+
+/// Copies the values of a lane. By fours, and not inlined: with AVX-512 LLVM would make gathers of it, at several
+/// times the cost of plain loads.
+#[inline(never)]
+fn gather<const L: usize>(values: &[[f32; L]], lane: usize, tally: Tally, row: &mut [f32]) {
+    if tally == Tally::FAILED {
+        return row.fill(0.0);
+    }
+    let (from, from_rest) = values.as_chunks::<4>();
+    let (to, to_rest) = row.as_chunks_mut::<4>();
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = [from[0][lane], from[1][lane], from[2][lane], from[3][lane]];
+    }
+    for (to, from) in to_rest.iter_mut().zip(from_rest) {
+        *to = from[lane];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use crate::program::Bounds;
+    use crate::quantity::Quantity;
+    use crate::recipe::{Intensity, Recipe, RecipeBuilder};
+    use crate::stream::Stream;
+
+    /// Recipes of every kind, some of whose draws fail.
+    fn recipes() -> Vec<(Recipe, u32)> {
+        let [surface, light] = ["munsell-vrhel", "granada"].map(|name| Model::builtin(name).unwrap());
+        let surface = || Recipe::new(&surface);
+        let all_but = |builder: RecipeBuilder, quantity| {
+            builder.quantities(Quantity::ALL.into_iter().filter(|q| *q != quantity))
+        };
+        let lit = |builder| all_but(builder, Quantity::Intensity);
+        let recipe = |builder: RecipeBuilder, max_attempts| (builder.build().unwrap(), max_attempts);
+        vec![
+            recipe(Recipe::new(&light), 100),
+            recipe(
+                all_but(Recipe::new(&light).intensity(Intensity::LogUniform(0.15, 150.0)), Quantity::Lrv),
+                100,
+            ),
+            recipe(surface(), 100),
+            recipe(lit(surface().covariance_scale(25.0)), 3),
+            recipe(lit(surface().lrv(0.6)).layout(Layout::Planes), 100),
+            recipe(
+                lit(surface().lrv(0.6).bounds(Bounds::Scaled)).layout(Layout::PaddedRows).half_spectra(),
+                100,
+            ),
+            recipe(lit(surface().lrv(0.8).bounds(Bounds::Both)).layout(Layout::Planes).half_spectra(), 2),
+            recipe(surface().half_spectra(), 100),
+        ]
+    }
+
+    fn kernel(recipe: &(Recipe, u32)) -> Kernel<f32> {
+        let program = recipe.0.program().tallied();
+        Kernel::new(&crate::program::Program { max_attempts: recipe.1, ..program })
+    }
+
+    fn arrays(kernel: &Kernel<f32>, count: u64) -> Vec<Vec<u32>> {
+        let words = |format: Format| vec![0; format.bytes(count).div_ceil(4) as usize];
+        kernel.outputs.iter().map(|output| words(output.format)).collect()
+    }
+
+    fn in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws) -> Vec<Vec<u32>> {
+        let mut arrays = arrays(kernel, draws.count);
+        let count = draws.count as usize;
+        let all = count.next_multiple_of(4).max(4);
+        let columns = kernel.outputs.iter().zip(&mut arrays);
+        let columns = columns.flat_map(|(output, words)| split(output.format, words, count, all)).collect();
+        fill_in_lanes::<L>(kernel, draws, columns);
+        arrays
+    }
+
+    #[test]
+    fn any_number_of_lanes_gives_the_scalar_draws() {
+        for recipe in recipes() {
+            let kernel = kernel(&recipe);
+            for count in [1, 7, 15, 16, 17, 33, 1000] {
+                let draws = Stream::new(1).draws((1 << 32) - 20..).part(0, count);
+                let expected = in_lanes::<1>(&kernel, draws);
+                assert!(in_lanes::<2>(&kernel, draws) == expected);
+                assert!(in_lanes::<7>(&kernel, draws) == expected);
+                assert!(in_lanes::<16>(&kernel, draws) == expected);
+                assert!(in_lanes::<32>(&kernel, draws) == expected);
+            }
+        }
+    }
+
+    /// `in_lanes` is compiled for the baseline, `fill` runs the best that this machine has, in chunks.
+    #[test]
+    fn every_level_of_instructions_gives_the_same_bytes() {
+        for recipe in recipes() {
+            let kernel = kernel(&recipe);
+            for count in [0, 1, 4097, 20_003] {
+                let draws = Stream::new(2).draws(0..count);
+                let mut filled = arrays(&kernel, count);
+                fill(&kernel, draws, &mut filled);
+                assert!(
+                    filled == if count == 0 { arrays(&kernel, 0) } else { in_lanes::<1>(&kernel, draws) }
+                );
+            }
+        }
+    }
+
+    /// What is in the arrays is what `Kernel::draw` gives, where the format says it lies.
+    #[test]
+    fn values_lie_where_their_format_says() {
+        for recipe in recipes() {
+            let kernel = kernel(&recipe);
+            let count = 37;
+            let arrays = in_lanes::<16>(&kernel, Stream::new(3).draws(0..count));
+            for i in 0..count {
+                let (values, tally) = kernel.draw(Stream::new(3), i);
+                for ((output, values), words) in kernel.outputs.iter().zip(values).zip(&arrays) {
+                    let format = output.format;
+                    let at = |j: usize| match format.layout {
+                        Layout::Planes => j * count.next_multiple_of(4) as usize + i as usize,
+                        _ => i as usize * format.stride() + j,
+                    };
+                    match format.element {
+                        Element::U32 => assert_eq!(bytemuck::cast::<_, Tally>(words[i as usize]), tally),
+                        Element::F32 => {
+                            (0..format.width).for_each(|j| assert_eq!(words[at(j)], values[j].to_bits()))
+                        }
+                        Element::F16 => {
+                            let halves: &[f16] = bytemuck::cast_slice(words);
+                            (0..format.width)
+                                .for_each(|j| assert_eq!(halves[at(j)], f16::from_f32(values[j])));
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

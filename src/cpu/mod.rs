@@ -1,0 +1,355 @@
+//! The draw on the CPU, generic over the arithmetic: in f32 it is the shader's twin, bit for bit where the adapter
+//! neither fuses multiply and add nor rounds division and roots its own way; in f64 it is the oracle that both are
+//! judged by. The order of operations is part of the definition: what looks like it could be summed another way must
+//! not be.
+//!
+//! Candidates are made in lanes: L of them at a time, each step in a loop over lanes that the compiler turns into
+//! vector instructions. A lane works on one draw, and takes the next one when it is done, so none waits for its
+//! neighbours' retries. With one lane this is the plain scalar draw; there is no other. [`fill`] is compiled for
+//! several levels of instructions, of which the best is chosen at run time; multiplications and additions are never
+//! fused, so all of them give the same bytes.
+
+mod columns;
+
+pub(crate) use columns::fill;
+
+use crate::dataset::Kind;
+use crate::level::{self, Level};
+use crate::normal::Real;
+use crate::program::{self, Affine, Program, Source, Tally};
+use crate::quantity::Format;
+use crate::stream::{self, Draws, Stream};
+
+/// A [`Program`] with its numbers rounded to `R`.
+pub(crate) struct Kernel<R> {
+    spectrum: Map<R>,
+    target: Option<Target<R>>,
+    level: Option<Level<R>>,
+    /// What a physical value is below, before scaling.
+    limit: R,
+    tests_scaled: bool,
+    may_exceed_one: bool,
+    /// Whether spectra come out, and scaled.
+    scales_spectra: bool,
+    max_attempts: u32,
+    outputs: Vec<Output<R>>,
+}
+
+/// An [`Affine`] map of the normals, value by value.
+struct Map<R> {
+    offset: Vec<R>,
+    /// k gains for each value.
+    gain: Vec<R>,
+    components: usize,
+}
+
+struct Target<R> {
+    lrv: R,
+    weights: Vec<R>,
+}
+
+struct Output<R> {
+    format: Format,
+    value: Value<R>,
+}
+
+/// A [`Source`].
+enum Value<R> {
+    Spectrum,
+    Map(Map<R>, Unit<R>),
+    Level,
+    Tally,
+}
+
+/// A [`program::Unit`].
+enum Unit<R> {
+    One,
+    Scale,
+    Over(Map<R>),
+}
+
+/// The candidates that are being made, a lane each.
+struct Candidates<R, const L: usize> {
+    normals: Vec<[R; L]>,
+    spectrum: Vec<[R; L]>,
+    /// What multiplies the spectrum.
+    scale: [R; L],
+    /// The values of each output that is a map.
+    maps: Vec<Vec<[R; L]>>,
+}
+
+/// What candidates came to, a lane each.
+struct Verdicts<const L: usize> {
+    accepted: [bool; L],
+    above_one: [bool; L],
+}
+
+impl<R: Real> Kernel<R> {
+    pub(crate) fn new(program: &Program) -> Kernel<R> {
+        let output = |output: &program::Output| Output {
+            format: output.format,
+            value: match &output.source {
+                Source::Spectrum => Value::Spectrum,
+                Source::Map(map, program::Unit::One) => Value::Map(Map::new(map), Unit::One),
+                Source::Map(map, program::Unit::Scale) => Value::Map(Map::new(map), Unit::Scale),
+                Source::Map(map, program::Unit::Over(over)) => {
+                    Value::Map(Map::new(map), Unit::Over(Map::new(over)))
+                }
+                Source::Level => Value::Level,
+                Source::Tally => Value::Tally,
+            },
+        };
+        let limit = match program.kind {
+            Kind::Reflectance if program.tests_base() => R::ONE,
+            _ => R::INFINITY,
+        };
+        Kernel {
+            spectrum: Map::new(&program.spectrum),
+            target: program
+                .target
+                .as_ref()
+                .map(|t| Target { lrv: R::from_f64(t.lrv), weights: round(&t.weights) }),
+            level: program.level.as_ref().map(Level::new),
+            limit,
+            tests_scaled: program.tests_scaled(),
+            may_exceed_one: program.may_exceed_one(),
+            scales_spectra: program.scales() && program.outputs.iter().any(|o| o.source == Source::Spectrum),
+            max_attempts: program.max_attempts,
+            outputs: program.outputs.iter().map(output).collect(),
+        }
+    }
+
+    /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
+    pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, Tally) {
+        let mut drawn = (Vec::new(), Tally::FAILED);
+        self.in_lanes::<1>(Draws { stream, first: index, count: 1 }, |_, _, candidates, tally| {
+            drawn = (self.values(candidates, tally), tally);
+        });
+        drawn
+    }
+
+    /// The candidate of the words that `block` gives for each block, as the values of each output; `None` where it is
+    /// rejected.
+    pub(crate) fn candidate(&self, block: impl FnMut(u32) -> [u32; 4]) -> Option<Vec<Vec<R>>> {
+        let mut block = block;
+        let mut candidates = self.candidates::<1>();
+        let verdicts = self.judge(&mut candidates, |b| block(b).map(|word| [word]));
+        verdicts.accepted[0].then(|| self.values(&candidates, Tally::accepted(1, false)))
+    }
+
+    /// Whether the candidate of those words is accepted.
+    pub(crate) fn accepts(&self, block: impl FnMut(u32) -> [u32; 4]) -> bool {
+        self.candidate(block).is_some()
+    }
+
+    fn values(&self, candidates: &Candidates<R, 1>, tally: Tally) -> Vec<Vec<R>> {
+        let first = |values: &[[R; 1]]| values.iter().map(|[value]| *value).collect();
+        let zero_where_failed = |values: Vec<R>| match tally {
+            Tally::FAILED => vec![R::ZERO; values.len()],
+            _ => values,
+        };
+        let values = self.outputs.iter().zip(&candidates.maps).map(|(output, maps)| match output.value {
+            Value::Spectrum => first(&candidates.spectrum),
+            Value::Map(..) => first(maps),
+            Value::Level => vec![candidates.scale[0]],
+            Value::Tally => Vec::new(),
+        });
+        values.map(zero_where_failed).collect()
+    }
+
+    /// Makes all of `draws`, and hands each to `take` when it is done: its number from the first on, and the lane of
+    /// the candidates that has it. Where it failed the candidates are those of its last attempt.
+    #[inline(always)]
+    fn in_lanes<const L: usize>(
+        &self,
+        draws: Draws,
+        mut take: impl FnMut(usize, usize, &Candidates<R, L>, Tally),
+    ) {
+        let mut candidates = self.candidates::<L>();
+        let mut numbers = 0..draws.count as usize;
+        let mut lanes: [_; L] = std::array::from_fn(|_| numbers.next());
+        // A lane without a draw goes on with the first, to no effect.
+        let words = |lane: Option<usize>| stream::words(draws.first.wrapping_add(lane.unwrap_or(0) as u64));
+        let (mut low, mut high, mut attempts) = ([0; L], [0; L], [0; L]);
+        for l in 0..L {
+            [low[l], high[l]] = words(lanes[l]);
+        }
+        while lanes.iter().any(Option::is_some) {
+            let verdicts = self.judge(&mut candidates, |b| match b {
+                level::BLOCK => draws.stream.blocks([low, high], [0; L], b),
+                _ => draws.stream.blocks([low, high], attempts, b),
+            });
+            for l in 0..L {
+                let Some(number) = lanes[l] else { continue };
+                attempts[l] += 1;
+                if verdicts.accepted[l] {
+                    take(number, l, &candidates, Tally::accepted(attempts[l], verdicts.above_one[l]));
+                } else if attempts[l] == self.max_attempts {
+                    take(number, l, &candidates, Tally::FAILED);
+                } else {
+                    continue;
+                }
+                attempts[l] = 0;
+                lanes[l] = numbers.next();
+                [low[l], high[l]] = words(lanes[l]);
+            }
+        }
+    }
+
+    fn candidates<const L: usize>(&self) -> Candidates<R, L> {
+        let maps = self.outputs.iter().map(|output| match &output.value {
+            Value::Map(map, _) => vec![[R::ZERO; L]; map.offset.len()],
+            _ => Vec::new(),
+        });
+        Candidates {
+            normals: vec![[R::ZERO; L]; self.spectrum.components.next_multiple_of(2)],
+            spectrum: vec![[R::ZERO; L]; self.spectrum.offset.len()],
+            scale: [R::ONE; L],
+            maps: maps.collect(),
+        }
+    }
+
+    /// Makes the candidates of the words that `block` gives for each block, and judges them.
+    #[inline(always)]
+    fn judge<const L: usize>(
+        &self,
+        candidates: &mut Candidates<R, L>,
+        mut block: impl FnMut(u32) -> [[u32; L]; 4],
+    ) -> Verdicts<L> {
+        make_normals(&mut candidates.normals, &mut block);
+        let mut physical = Range::new();
+        for (b, s) in candidates.spectrum.iter_mut().enumerate() {
+            *s = self.spectrum.value(b, &candidates.normals);
+            physical.include(s);
+        }
+        let mut verdicts = Verdicts {
+            accepted: std::array::from_fn(|l| physical.is_within(l, self.limit)),
+            above_one: [false; L],
+        };
+        if let Some(target) = &self.target {
+            candidates.scale = target.factor(&candidates.spectrum);
+            for l in 0..L {
+                let peak = physical.high[l] * candidates.scale[l];
+                verdicts.accepted[l] &= !self.tests_scaled || peak < R::ONE;
+                verdicts.above_one[l] = self.may_exceed_one && peak >= R::ONE;
+            }
+        } else if let Some(level) = &self.level {
+            let [word, ..] = block(level::BLOCK);
+            candidates.scale = word.map(|word| level.of(word));
+        }
+        if self.scales_spectra {
+            candidates.spectrum.iter_mut().for_each(|s| multiply(s, &candidates.scale));
+        }
+        for (output, values) in self.outputs.iter().zip(&mut candidates.maps) {
+            let Value::Map(map, unit) = &output.value else { continue };
+            let unit = match unit {
+                Unit::One => None,
+                Unit::Scale => Some(candidates.scale),
+                Unit::Over(over) => Some(over.value(0, &candidates.normals).map(|v| R::ONE / floored(v))),
+            };
+            for (j, value) in values.iter_mut().enumerate() {
+                *value = map.value(j, &candidates.normals);
+                unit.iter().for_each(|unit| multiply(value, unit));
+            }
+        }
+        verdicts
+    }
+}
+
+impl<R: Real> Map<R> {
+    fn new(map: &Affine) -> Map<R> {
+        let by_value = (0..map.offset.len()).flat_map(|j| map.gain.iter().map(move |gain| gain[j]));
+        Map {
+            offset: map.offset.iter().map(|&v| R::from_f64(v + 0.0)).collect(), // no -0: see `forms` of src/wgsl
+            gain: by_value.map(R::from_f64).collect(),
+            components: map.gain.len(),
+        }
+    }
+
+    /// offset + gain . z of a value, in the order of the components.
+    #[inline(always)]
+    fn value<const L: usize>(&self, j: usize, normals: &[[R; L]]) -> [R; L] {
+        let gains = &self.gain[j * self.components..(j + 1) * self.components];
+        let mut sum = [self.offset[j]; L];
+        for (&gain, z) in gains.iter().zip(normals) {
+            for l in 0..L {
+                sum[l] = sum[l] + gain * z[l];
+            }
+        }
+        sum
+    }
+}
+
+impl<R: Real> Target<R> {
+    /// What scales spectra to the target.
+    #[inline(always)]
+    fn factor<const L: usize>(&self, spectrum: &[[R; L]]) -> [R; L] {
+        let mut lrv = [R::ZERO; L];
+        for (b, (&weight, s)) in self.weights.iter().zip(spectrum).enumerate() {
+            for l in 0..L {
+                let product = weight * s[l];
+                lrv[l] = if b == 0 { product } else { lrv[l] + product }; // in the order of the bands
+            }
+        }
+        lrv.map(|lrv| self.lrv / floored(lrv))
+    }
+}
+
+fn round<R: Real>(values: &[f64]) -> Vec<R> {
+    values.iter().map(|&v| R::from_f64(v)).collect()
+}
+
+/// Raised to where it may divide: a candidate that needs it is not physical anyway.
+#[inline(always)]
+fn floored<R: Real>(value: R) -> R {
+    if value > R::FLOOR { value } else { R::FLOOR }
+}
+
+#[inline(always)]
+fn multiply<R: Real, const L: usize>(values: &mut [R; L], by: &[R; L]) {
+    for l in 0..L {
+        values[l] = values[l] * by[l];
+    }
+}
+
+/// The least and the largest value of each lane.
+struct Range<R, const L: usize> {
+    low: [R; L],
+    high: [R; L],
+}
+
+impl<R: Real, const L: usize> Range<R, L> {
+    fn new() -> Self {
+        Range { low: [R::INFINITY; L], high: [R::ZERO; L] }
+    }
+
+    #[inline(always)]
+    fn include(&mut self, values: &[R; L]) {
+        for (l, &value) in values.iter().enumerate() {
+            self.low[l] = if value < self.low[l] { value } else { self.low[l] };
+            self.high[l] = if value > self.high[l] { value } else { self.high[l] };
+        }
+    }
+
+    /// Whether all values of a lane are positive and below `limit`.
+    #[inline(always)]
+    fn is_within(&self, lane: usize, limit: R) -> bool {
+        self.low[lane] > R::ZERO && self.high[lane] < limit
+    }
+}
+
+/// The normals of the words of each block: four a block, two a pair of words.
+#[inline(always)]
+fn make_normals<R: Real, const L: usize>(
+    normals: &mut [[R; L]],
+    mut block: impl FnMut(u32) -> [[u32; L]; 4],
+) {
+    for (b, normals) in normals.chunks_mut(4).enumerate() {
+        let words = block(b as u32);
+        for (normals, words) in normals.chunks_exact_mut(2).zip(words.chunks_exact(2)) {
+            for l in 0..L {
+                [normals[0][l], normals[1][l]] = R::normal_pair(words[0][l], words[1][l]);
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! From the quantities that a recipe asks for to what computes them: each as a map of the normals, folded in f64.
+
+use crate::colorimetry;
+use crate::dataset::Kind;
+use crate::model::Model;
+use crate::program::{self, Affine, Output, Program, Source, Unit};
+use crate::quantity::{Element, Format, Layout, Quantity};
+use crate::recipe::{Luminance, RecipeError};
+
+/// What a recipe asks for.
+#[derive(Clone, Debug)]
+pub(crate) struct Asked {
+    pub(crate) quantities: Vec<Quantity>,
+    pub(crate) layout: Layout,
+    /// The type of spectra.
+    pub(crate) spectra: Element,
+    /// The illuminant of reflectances, if it is not D65.
+    pub(crate) light: Option<Vec<f64>>,
+    pub(crate) luminance: Luminance,
+    /// The intensity of every draw, where it is the same.
+    pub(crate) fixed: Option<f64>,
+}
+
+impl Default for Asked {
+    fn default() -> Self {
+        Asked {
+            quantities: vec![Quantity::Spectra],
+            layout: Layout::default(),
+            spectra: Element::F32,
+            light: None,
+            luminance: Luminance::default(),
+            fixed: None,
+        }
+    }
+}
+
+/// What comes out of a program, each quantity once and in their order.
+pub(crate) fn outputs(
+    asked: &Asked,
+    model: &Model,
+    program: &Program,
+    covariance_scale: f64,
+) -> Result<Vec<Output>, RecipeError> {
+    let mut quantities = asked.quantities.clone();
+    quantities.sort_unstable();
+    quantities.dedup();
+    if quantities.is_empty() {
+        return Err(RecipeError::Nothing);
+    }
+    let output = |quantity| {
+        let source = source(quantity, asked, model, program, covariance_scale)?;
+        let width = match &source {
+            Source::Spectrum => program.bands(),
+            Source::Map(map, _) => map.offset.len(),
+            Source::Level | Source::Tally => 1,
+        };
+        let element = match quantity {
+            Quantity::Spectra => asked.spectra,
+            Quantity::Attempts => Element::U32,
+            _ => Element::F32,
+        };
+        let layout = match quantity {
+            Quantity::Lrv | Quantity::Attempts | Quantity::Intensity => Layout::Rows,
+            _ => asked.layout,
+        };
+        Ok(Output { format: Format { quantity, element, width, layout }, source })
+    };
+    quantities.into_iter().map(output).collect()
+}
+
+fn source(
+    quantity: Quantity,
+    asked: &Asked,
+    model: &Model,
+    program: &Program,
+    covariance_scale: f64,
+) -> Result<Source, RecipeError> {
+    let unless = |reason| RecipeError::Quantity { quantity, reason };
+    let scaled = if program.scales() { Unit::Scale } else { Unit::One };
+    let k = program.components();
+    Ok(match quantity {
+        Quantity::Spectra => Source::Spectrum,
+        Quantity::Weights => Source::Map(program::weights(model, covariance_scale), Unit::One),
+        Quantity::Xyz | Quantity::Srgb => {
+            let xyz = program.spectrum.project(&xyz_weights(asked, model)?);
+            let unit = match (model.kind(), asked.luminance) {
+                (Kind::Illuminant, Luminance::One) => Unit::Over(xyz.value(1)),
+                _ => scaled,
+            };
+            let map = if quantity == Quantity::Xyz { xyz } else { xyz.project(&colorimetry::XYZ_TO_SRGB) };
+            Source::Map(map, unit)
+        }
+        Quantity::Lrv => match (&program.target, model.kind()) {
+            (_, Kind::Illuminant) => {
+                return Err(unless("illuminants have no luminous reflectance"));
+            }
+            (Some(target), _) => Source::Map(Affine::constant(target.lrv, k), Unit::One),
+            (None, _) => {
+                let grid = model.grid();
+                let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+                Source::Map(program.spectrum.project(&[weights]), Unit::One)
+            }
+        },
+        Quantity::Attempts => Source::Tally,
+        Quantity::Intensity => match (&program.level, asked.fixed) {
+            (Some(_), _) => Source::Level,
+            (None, Some(intensity)) => Source::Map(Affine::constant(intensity, k), Unit::One),
+            (None, None) => return Err(unless("the recipe has no intensity")),
+        },
+    })
+}
+
+/// The weights of the bands in X, Y and Z.
+fn xyz_weights(asked: &Asked, model: &Model) -> Result<[Vec<f64>; 3], RecipeError> {
+    let grid = model.grid();
+    if model.kind() == Kind::Illuminant {
+        return Ok(colorimetry::cmf(grid).map(|f| f.iter().map(|v| v * grid.step()).collect()));
+    }
+    let Some(light) = &asked.light else {
+        return colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid));
+    };
+    if light.len() != grid.len() {
+        return Err(RecipeError::Light { found: light.len(), expected: grid.len() });
+    }
+    if !light.iter().all(|power| power.is_finite() && *power >= 0.0) {
+        return Err(RecipeError::DarkLight);
+    }
+    colorimetry::xyz_weights_under(light, grid).ok_or(RecipeError::DarkLight)
+}

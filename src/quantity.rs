@@ -1,0 +1,158 @@
+//! What comes out of a draw, and how it lies in memory.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Something that a draw can give. Each is an array of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quantity {
+    /// The spectrum: a value for each band, after scaling where there is a target or an intensity.
+    Spectra,
+    /// The weights of the model's components, k values, of the spectrum before scaling.
+    Weights,
+    /// CIE 1931 tristimulus values, 3: of a reflectance under an illuminant, where a perfect white has Y = 1; of an
+    /// illuminant its own.
+    Xyz,
+    /// The same as linear Rec. 709 components, 3 (IEC 61966-2-1), unclamped.
+    Srgb,
+    /// The luminous reflectance value of a reflectance under D65; the target where there is one.
+    Lrv,
+    /// A [`Tally`](crate::Tally): how many candidates the draw took.
+    Attempts,
+    /// What an illuminant was multiplied by.
+    Intensity,
+}
+
+impl Quantity {
+    /// All of them.
+    pub const ALL: [Quantity; 7] = [
+        Quantity::Spectra,
+        Quantity::Weights,
+        Quantity::Xyz,
+        Quantity::Srgb,
+        Quantity::Lrv,
+        Quantity::Attempts,
+        Quantity::Intensity,
+    ];
+
+    /// Its name, as shaders, files and the command line have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quantity::Spectra => "spectra",
+            Quantity::Weights => "weights",
+            Quantity::Xyz => "xyz",
+            Quantity::Srgb => "srgb",
+            Quantity::Lrv => "lrv",
+            Quantity::Attempts => "attempts",
+            Quantity::Intensity => "intensity",
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// How the values of quantities that have several a draw are ordered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// (draw, value): draw by draw, without padding.
+    #[default]
+    Rows,
+    /// The same, with zeros up to a multiple of 4 values a draw, for shaders that read `vec4`s.
+    PaddedRows,
+    /// (value, draw): a plane for each value, which has a multiple of 4 draws; those beyond the last mean nothing.
+    Planes,
+}
+
+/// The type of a value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Element {
+    /// 32 bits, floating.
+    #[default]
+    F32,
+    /// 16 bits, floating: 11 significant bits, nothing above 65,504. Two make a word of a shader, the first its low
+    /// half.
+    F16,
+    /// 32 bits, unsigned.
+    U32,
+}
+
+/// How a quantity lies in its array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Format {
+    /// What it is.
+    pub quantity: Quantity,
+    /// The type of its values.
+    pub element: Element,
+    /// How many a draw has, without padding.
+    pub width: usize,
+    /// How they are ordered.
+    pub layout: Layout,
+}
+
+impl Format {
+    /// That of spectra unless asked otherwise.
+    pub(crate) fn spectra(bands: usize) -> Format {
+        Format { quantity: Quantity::Spectra, element: Element::F32, width: bands, layout: Layout::Rows }
+    }
+
+    /// That of tallies.
+    pub(crate) fn tally() -> Format {
+        Format { quantity: Quantity::Attempts, element: Element::U32, width: 1, layout: Layout::Rows }
+    }
+
+    /// How many values there are from the start of one row to the start of the next. 1 in planes.
+    pub fn stride(&self) -> usize {
+        match self.layout {
+            Layout::Rows => self.width,
+            Layout::PaddedRows => self.width.next_multiple_of(4),
+            Layout::Planes => 1,
+        }
+    }
+
+    /// How many planes there are; 1 in rows.
+    pub fn planes(&self) -> usize {
+        if self.layout == Layout::Planes { self.width } else { 1 }
+    }
+
+    /// How many values the array of `draws` draws has, padding and all.
+    pub fn values(&self, draws: u64) -> u64 {
+        match self.layout {
+            Layout::Rows | Layout::PaddedRows => draws * self.stride() as u64,
+            Layout::Planes => draws.next_multiple_of(4) * self.width as u64,
+        }
+    }
+
+    /// How many bytes a value has.
+    pub fn element_bytes(&self) -> usize {
+        match self.element {
+            Element::F16 => 2,
+            Element::F32 | Element::U32 => 4,
+        }
+    }
+
+    /// How many bytes the array of `draws` draws has.
+    pub fn bytes(&self, draws: u64) -> u64 {
+        self.values(draws) * self.element_bytes() as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        let format = |layout, element| Format { quantity: Quantity::Spectra, element, width: 31, layout };
+        assert_eq!(format(Layout::Rows, Element::F32).bytes(5), 4 * 31 * 5);
+        assert_eq!(format(Layout::PaddedRows, Element::F32).bytes(5), 4 * 32 * 5);
+        assert_eq!(format(Layout::Planes, Element::F16).bytes(5), 2 * 31 * 8);
+    }
+}

@@ -1,0 +1,145 @@
+//! What is computed of a candidate, in straight lines or in loops.
+//!
+//! Either way the functions are the same, of a candidate's `Normals`, and so is the order of operations:
+//! - `normals(key, index, stream, attempt) -> Normals`: k standard normals;
+//! - `worst(z) -> u32`: the largest `excess` of a band before scaling;
+//! - `factor(z) -> f32`: what scales it to the target, where there is one;
+//! - `is_accepted(z) -> bool`;
+//! - `scale(z, key, index, stream) -> f32`: what multiplies a draw's spectrum, where something does.
+
+use super::tables::Tables;
+use super::text::{Text, float, list};
+use super::{Form, LOOPED, LUMINANCE};
+use crate::dataset::Kind;
+use crate::level;
+use crate::normal::Real;
+use crate::program::{Affine, Level, Program, Source, Unit};
+
+/// All of it.
+pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
+    let mut text = match Form::of(program) {
+        Form::Unrolled => unrolled(program),
+        Form::Looped => looped(program, tables),
+    };
+    if let Some(target) = &program.target {
+        text.block("fn factor(z: Normals) -> f32", |body| {
+            let (lrv, floor) = (float(target.lrv), <f32 as Real>::FLOOR);
+            body.line(&format!("return {lrv} / max(luminance(z), {floor:?}f);"));
+        });
+    }
+    text.block("fn is_accepted(z: Normals) -> bool", |body| {
+        // What the excess of every band must be below: that of 1, or of infinity.
+        let bound = match program.kind {
+            Kind::Reflectance if program.tests_base() => 1f32,
+            _ => f32::INFINITY,
+        };
+        let limit = bound.to_bits() - 1;
+        match program.tests_scaled() {
+            false => body.line(&format!("return worst(z) < {limit}u;")),
+            true => {
+                body.line("let e = worst(z);");
+                body.line(&format!("return e < {limit}u && peak(e) * factor(z) < 1f;"));
+            }
+        }
+    });
+    if program.scales() {
+        text.block("fn scale(z: Normals, key: vec2<u32>, index: vec2<u32>, stream: u32) -> f32", |body| {
+            match &program.level {
+                Some(level) => draw_level(body, level, tables),
+                None => body.line("return factor(z);"),
+            }
+        });
+    }
+    text.0
+}
+
+fn draw_level(body: &mut Text, level: &Level, tables: &Tables) {
+    body.line(&format!("let word = philox(vec4(index, 0u, stream | {}u), key).x;", level::BLOCK));
+    match level {
+        Level::LogUniform { low, octaves } => {
+            body.line(&format!(
+                "return {} * power_of_two(uniform_of(word) * {});",
+                float(*low),
+                float(*octaves)
+            ));
+        }
+        Level::OneOf(levels) => {
+            body.line(&format!("return tables[{}u + mul_wide(word, {}u).y];", tables.levels, levels.len()));
+        }
+    }
+}
+
+fn unrolled(program: &Program) -> Text {
+    let (n, k) = (program.bands(), program.components());
+    let mut text = Text::default();
+    text.line(&format!("struct Normals {{ {} }}", list(k, |j| format!("z{j}: f32"))));
+    text.line(&format!("struct Bands {{ {} }}", list(n, |b| format!("b{b}: f32"))));
+    text.block(
+        "fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Normals",
+        |body| {
+            for block in 0..k.div_ceil(4) {
+                body.line(&format!("let w{block} = philox(vec4(index, attempt, stream | {block}u), key);"));
+            }
+            for pair in 0..k.div_ceil(2) {
+                let [x, y] = if pair % 2 == 0 { ["x", "y"] } else { ["z", "w"] };
+                body.line(&format!("let p{pair} = normal_pair(w{0}.{x}, w{0}.{y});", pair / 2));
+            }
+            let normal = |j| format!("p{}.{}", j / 2, if j % 2 == 0 { "x" } else { "y" });
+            body.line(&format!("return Normals({});", list(k, normal)));
+        },
+    );
+    text.line("");
+    forms(&mut text, "band", &program.spectrum);
+    text.block("fn bands(z: Normals) -> Bands", |body| {
+        body.line(&format!("return Bands({});", list(n, |b| format!("band{b}(z)"))));
+    });
+    text.block("fn worst(z: Normals) -> u32", |body| {
+        body.line("let s = bands(z);");
+        body.line("var e = 0u;");
+        (0..n).for_each(|b| body.line(&format!("e = max(e, excess(s.b{b}));")));
+        body.line("return e;");
+    });
+    if let Some(target) = &program.target {
+        text.block("fn luminance(z: Normals) -> f32", |body| {
+            body.line("let s = bands(z);");
+            let products = target.weights.iter().enumerate().map(|(b, w)| format!("{} * s.b{b}", float(*w)));
+            body.line(&format!("return {};", products.collect::<Vec<_>>().join(" + ")));
+        });
+    }
+    for output in &program.outputs {
+        if let Source::Map(map, unit) = &output.source {
+            text.line("");
+            forms(&mut text, &format!("{}_", output.format.quantity), map);
+            if let Unit::Over(map) = unit {
+                forms(&mut text, &format!("{}_over_", output.format.quantity), map);
+            }
+        }
+    }
+    text
+}
+
+/// A function of the normals for each value of a map: its name is `name` and the value's number. Gains of 0 are left
+/// out, which changes no sum: an offset of -0 is rounded to 0.
+fn forms(text: &mut Text, name: &str, map: &Affine) {
+    for (row, &offset) in map.offset.iter().enumerate() {
+        let gains = map.gain.iter().map(|gain| gain[row]).enumerate().filter(|(_, g)| *g as f32 != 0.0);
+        let terms: String = gains.map(|(j, g)| format!(" + {} * z.z{j}", float(g))).collect();
+        text.line(&format!("fn {name}{row}(z: Normals) -> f32 {{ return {}{terms}; }}", float(offset + 0.0)));
+    }
+}
+
+/// The fragment `looped.wgsl` with the program's constants.
+fn looped(program: &Program, tables: &Tables) -> Text {
+    let (n, k) = (program.bands(), program.components());
+    let mut text = Text::default();
+    for (name, value) in [("BANDS", n), ("COMPONENTS", k), ("BLOCKS", k.div_ceil(4))] {
+        text.line(&format!("const {name} = {value}u;"));
+    }
+    text.line("");
+    text.0 += LOOPED;
+    if program.target.is_some() {
+        text.line("");
+        text.0 += &LUMINANCE.replace("LRV_WEIGHTS", &format!("{}u", tables.lrv_weights));
+    }
+    text
+}

@@ -1,0 +1,343 @@
+//! A program as WGSL text: the hand-written fragments of `shaders/`, and between them code that is generated for the
+//! program, with the model's numbers as constants.
+//!
+//! What the program does not need is not in the text: no luminance without a target, no upper bound for illuminants,
+//! no stores but of what was asked for. Straight lines are several times as fast as a loop that reads the model from a
+//! buffer, but take time to compile. Beyond [`UNROLLED_GAINS`] the same operations run in such a loop: same order, same
+//! bits.
+
+mod arithmetic;
+mod module;
+mod store;
+mod tables;
+mod text;
+
+pub use module::TextError;
+pub(crate) use module::module;
+pub(crate) use tables::Tables;
+
+use arithmetic::arithmetic;
+use store::store;
+
+use crate::program::{Level, Program};
+use crate::quantity::Element;
+
+/// Threads a workgroup.
+pub(crate) const WORKGROUP: u32 = 64;
+
+/// The binding of the parameters.
+pub(crate) const PARAMETERS_AT: u32 = 0;
+
+/// The binding of the tables.
+pub(crate) const TABLES_AT: u32 = 1;
+
+/// The binding of the first quantity; that of another is its number more.
+pub(crate) const OUTPUTS_AT: u32 = 2;
+
+/// The most gains (bands x components) that are written out as constants. At this size lavapipe takes 2.5 s to
+/// compile the straight lines, which then run 7 times as fast as the loop: they pay from 2e5 draws on.
+const UNROLLED_GAINS: usize = 2048;
+
+const MUL_WIDE: &str = include_str!("../../shaders/mul_wide.wgsl");
+const MUL_WIDE_INT64: &str = include_str!("../../shaders/mul_wide_int64.wgsl");
+const PHILOX: &str = include_str!("../../shaders/philox.wgsl");
+const NORMAL: &str = include_str!("../../shaders/normal.wgsl");
+const LEVEL: &str = include_str!("../../shaders/level.wgsl");
+const PHYSICAL: &str = include_str!("../../shaders/physical.wgsl");
+const LOOPED: &str = include_str!("../../shaders/looped.wgsl");
+const LUMINANCE: &str = include_str!("../../shaders/luminance.wgsl");
+const DRAW: &str = include_str!("../../shaders/draw.wgsl");
+const PARAMETERS: &str = include_str!("../../shaders/parameters.wgsl");
+const WORDS: &str = include_str!("../../shaders/words.wgsl");
+const HALF: &str = include_str!("../../shaders/half.wgsl");
+const MAIN: &str = include_str!("../../shaders/main.wgsl");
+
+/// What a device can do, as far as the text depends on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Target {
+    /// Any device.
+    Baseline,
+    /// A device with `SHADER_INT64`.
+    Int64,
+    /// A software adapter with `SHADER_INT64`.
+    SoftwareInt64,
+}
+
+/// How a program's arithmetic is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// In straight lines, with the model's numbers as constants.
+    Unrolled,
+    /// In loops over bands and components that read the model from a buffer (see [`Tables`]).
+    Looped,
+}
+
+impl Form {
+    pub(crate) fn of(program: &Program) -> Form {
+        match program.bands() * program.components() {
+            ..=UNROLLED_GAINS => Form::Unrolled,
+            _ => Form::Looped,
+        }
+    }
+}
+
+/// How many draws one thread makes: 2 where they fill words that are wider than a value.
+pub(crate) fn draws_per_thread(program: &Program, target: Target) -> u32 {
+    let halves = program.outputs.iter().any(|output| output.format.element == Element::F16);
+    match (Form::of(program), target) {
+        (Form::Unrolled, Target::SoftwareInt64) => 2,
+        _ if halves => 2,
+        _ => 1,
+    }
+}
+
+/// The fragments that make random words and normals: the whole of what does not depend on a program.
+pub(crate) fn generator(target: Target) -> String {
+    let mul_wide = match target {
+        Target::Baseline => MUL_WIDE,
+        Target::Int64 | Target::SoftwareInt64 => MUL_WIDE_INT64,
+    };
+    [mul_wide, PHILOX, NORMAL].join("\n")
+}
+
+/// The compute shader of a program, and the numbers that it reads.
+pub(crate) fn shader(program: &Program, target: Target) -> (String, Tables) {
+    let tables = Tables::new(program);
+    let draws = draws_per_thread(program, target);
+    let mut parts = vec![functions(program, &tables, target), PARAMETERS.to_owned()];
+    if !tables.values.is_empty() {
+        parts.push(format!("@group(0) @binding({TABLES_AT}) var<storage, read> tables: array<f32>;\n"));
+    }
+    let elements = || program.outputs.iter().map(|output| output.format.element);
+    if elements().any(|element| element == Element::F16) {
+        parts.push(HALF.to_owned());
+    }
+    if target == Target::SoftwareInt64 && draws == 2 && elements().any(|element| element != Element::F16) {
+        parts.push(WORDS.to_owned());
+    }
+    parts.push(store(program, &tables, target));
+    let drawn = if draws == 2 { "draw_at(i), draw_at(i + 1u)" } else { "draw_at(i)" };
+    let main = MAIN.replace("WORKGROUP", &WORKGROUP.to_string());
+    parts.push(main.replace("PER_THREAD", &format!("{draws}u")).replace("DRAWS", drawn));
+    (parts.join("\n"), tables)
+}
+
+/// The functions that make a draw, down to `draw_of`.
+fn functions(program: &Program, tables: &Tables, target: Target) -> String {
+    let draw: String = match program.scales() {
+        true => DRAW.to_owned(),
+        false => DRAW
+            .lines()
+            .filter(|line| !line.contains("scale") && !line.contains("multiplies"))
+            .fold(String::new(), |text, line| text + line + "\n"),
+    };
+    let mut parts = vec![generator(target), PHYSICAL.to_owned()];
+    if let Some(Level::LogUniform { .. }) = program.level {
+        parts.push(LEVEL.to_owned());
+    }
+    parts.extend([arithmetic(program, tables), draw]);
+    parts.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    use super::*;
+    use crate::dataset::Kind;
+    use crate::program::{self, Affine, Bounds, Output, Source, Unit};
+    use crate::quantity::{Format, Layout, Quantity};
+
+    /// A program of 3 bands and 2 components, small enough to read.
+    fn small(kind: Kind, target: Option<(f64, Bounds)>) -> Program {
+        program_of(kind, 3, 2, target)
+    }
+
+    fn program_of(kind: Kind, bands: usize, components: usize, target: Option<(f64, Bounds)>) -> Program {
+        let weights = vec![1.0 / bands as f64; bands];
+        let spectrum = Affine {
+            offset: (0..bands).map(|b| 0.5 + 0.125 * (b % 3) as f64).collect(),
+            gain: (0..components)
+                .map(|j| (0..bands).map(|b| 0.25 / (1 + j + b % 7) as f64).collect())
+                .collect(),
+        };
+        let outputs = vec![Output { format: Format::spectra(bands), source: Source::Spectrum }];
+        let target = target.map(|(lrv, bounds)| program::Target { lrv, weights, bounds });
+        Program { kind, spectrum, target, level: None, max_attempts: 100, outputs }.tallied()
+    }
+
+    /// The program with all that can come out of it, so laid.
+    fn with_all(program: Program, layout: Layout, spectra: Element) -> Program {
+        let (n, k) = (program.bands(), program.components());
+        let unit = || if program.scales() { Unit::Scale } else { Unit::One };
+        let mut weights = Affine::constant(0.25, k);
+        weights.gain[0][0] = 0.5;
+        let xyz = program.spectrum.project(&[vec![0.5; n], vec![0.25; n], vec![0.125; n]]);
+        let map = |quantity, map: Affine, unit| {
+            let format = Format { quantity, element: Element::F32, width: map.offset.len(), layout };
+            Output { format, source: Source::Map(map, unit) }
+        };
+        let over = match program.kind {
+            Kind::Illuminant => Unit::Over(xyz.value(1)),
+            Kind::Reflectance => unit(),
+        };
+        let mut outputs = vec![
+            Output {
+                format: Format { element: spectra, layout, ..Format::spectra(n) },
+                source: Source::Spectrum,
+            },
+            map(Quantity::Weights, weights, Unit::One),
+            map(Quantity::Xyz, xyz.clone(), over),
+            map(Quantity::Srgb, xyz, unit()),
+            Output { format: Format::tally(), source: Source::Tally },
+        ];
+        if program.level.is_some() {
+            let format = Format { quantity: Quantity::Intensity, element: Element::F32, ..Format::tally() };
+            outputs.push(Output { format, source: Source::Level });
+        }
+        Program { outputs, ..program }
+    }
+
+    /// The program with one quantity alone.
+    fn only(program: Program, quantity: Quantity) -> Program {
+        let mut program = with_all(program, Layout::Rows, Element::F32);
+        program.outputs.retain(|output| output.format.quantity == quantity);
+        program
+    }
+
+    fn validate(text: &str, capabilities: Capabilities) -> Result<(), String> {
+        let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
+        let mut validator = Validator::new(ValidationFlags::all(), capabilities);
+        validator.validate(&module).map(drop).map_err(|e| e.emit_to_string(text))
+    }
+
+    /// Programs of every kind, size and layout.
+    fn programs() -> Vec<Program> {
+        let rules = [None, Some(Bounds::Base), Some(Bounds::Scaled), Some(Bounds::Both)];
+        let mut programs = Vec::new();
+        for (bands, components) in [(1, 1), (3, 2), (31, 6), (61, 12), (70, 64), (1000, 64)] {
+            let of = |kind, rule: Option<Bounds>| {
+                program_of(kind, bands, components, rule.map(|bounds| (0.4, bounds)))
+            };
+            programs.push(of(Kind::Illuminant, None));
+            for level in [Level::LogUniform { low: 0.5, octaves: 10.0 }, Level::OneOf(vec![1.0, 2.0])] {
+                programs.push(Program { level: Some(level), ..of(Kind::Illuminant, None) });
+            }
+            programs.extend(rules.map(|rule| of(Kind::Reflectance, rule)));
+        }
+        let layouts = [Layout::Rows, Layout::PaddedRows, Layout::Planes];
+        let all = programs.clone().into_iter().flat_map(|program| {
+            layouts.into_iter().flat_map(move |layout| {
+                [Element::F32, Element::F16].map(|spectra| with_all(program.clone(), layout, spectra))
+            })
+        });
+        all.chain(programs).collect()
+    }
+
+    #[test]
+    fn every_variant_is_valid_with_no_more_than_it_says() {
+        for program in programs() {
+            for (target, needs) in [
+                (Target::Baseline, Capabilities::empty()),
+                (Target::Int64, Capabilities::SHADER_INT64),
+                (Target::SoftwareInt64, Capabilities::SHADER_INT64),
+            ] {
+                let (text, _) = shader(&program, target);
+                if let Err(e) = validate(&text, needs) {
+                    panic!("{target:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_module_is_valid_and_two_fit_in_one_shader() {
+        for program in programs() {
+            let (Ok(a), Ok(b)) = (module(&program, "wall"), module(&program, "table_top")) else {
+                let table = matches!(program.level, Some(Level::OneOf(_)));
+                assert!(table || Form::of(&program) == Form::Looped);
+                continue;
+            };
+            let both = format!("{a}\n{b}");
+            validate(&both, Capabilities::empty()).unwrap_or_else(|e| panic!("{e}"));
+        }
+        for prefix in ["", "1a", "a b", "a_", "a__b", "_a", "ä"] {
+            assert_eq!(module(&programs()[0], prefix), Err(TextError::Prefix(prefix.to_owned())));
+        }
+    }
+
+    #[test]
+    fn int64_is_not_taken_without_asking() {
+        let (text, _) = shader(&small(Kind::Illuminant, None), Target::Int64);
+        assert!(validate(&text, Capabilities::empty()).is_err());
+    }
+
+    /// The text between the fragments, for each kind of recipe: a change here is a decision.
+    #[test]
+    fn what_is_generated() {
+        let light = || small(Kind::Illuminant, None);
+        let surface = |target| small(Kind::Reflectance, target);
+        let lrv = |bounds| surface(Some((0.4, bounds)));
+        let level = Level::LogUniform { low: 0.15, octaves: 10.0 };
+        let lamp = || Program { level: Some(level.clone()), ..light() };
+        let lamps = || Program { level: Some(Level::OneOf(vec![1.0, 2.0])), ..light() };
+        let generated = |program: &Program, target| {
+            let tables = Tables::new(program);
+            arithmetic(program, &tables) + &store(program, &tables, target)
+        };
+        for (name, program, target) in [
+            ("illuminant", light(), Target::Baseline),
+            ("illuminant_log_uniform", with_all(lamp(), Layout::Rows, Element::F32), Target::Baseline),
+            ("illuminant_of_the_data", only(lamps(), Quantity::Intensity), Target::Baseline),
+            ("reflectance", surface(None), Target::Baseline),
+            ("reflectance_in_pairs", surface(None), Target::SoftwareInt64),
+            (
+                "reflectance_in_planes",
+                with_all(surface(None), Layout::Planes, Element::F32),
+                Target::SoftwareInt64,
+            ),
+            (
+                "reflectance_in_halves",
+                with_all(surface(None), Layout::PaddedRows, Element::F16),
+                Target::Int64,
+            ),
+            ("weights", only(surface(None), Quantity::Weights), Target::Baseline),
+            ("xyz", only(surface(None), Quantity::Xyz), Target::Baseline),
+            ("xyz_of_illuminant", only(light(), Quantity::Xyz), Target::Baseline),
+            ("attempts", only(surface(None), Quantity::Attempts), Target::Baseline),
+            ("lrv_base", lrv(Bounds::Base), Target::Baseline),
+            ("lrv_scaled", lrv(Bounds::Scaled), Target::Baseline),
+            ("lrv_both_in_pairs", lrv(Bounds::Both), Target::SoftwareInt64),
+        ] {
+            insta::assert_snapshot!(name, generated(&program, target));
+        }
+        let large = |layout, spectra| {
+            with_all(program_of(Kind::Reflectance, 400, 6, Some((0.4, Bounds::Both))), layout, spectra)
+        };
+        for (name, layout, spectra) in [
+            ("looped", Layout::Rows, Element::F32),
+            ("looped_in_halves", Layout::PaddedRows, Element::F16),
+            ("looped_in_planes", Layout::Planes, Element::F16),
+        ] {
+            insta::assert_snapshot!(name, generated(&large(layout, spectra), Target::Int64));
+        }
+    }
+
+    #[test]
+    fn what_is_not_asked_for_is_not_in_the_text() {
+        let text = |program: &Program| shader(program, Target::Baseline).0;
+        let plain = text(&small(Kind::Reflectance, None));
+        for word in
+            ["luminance", "factor", "scale", "fn half", "u64", "power_of_two", "weights", "xyz", "tables"]
+        {
+            assert!(!plain.contains(word), "{word}");
+        }
+        let one = format!("{}u", 1f32.to_bits() - 1);
+        let infinity = format!("{}u", f32::INFINITY.to_bits() - 1);
+        assert!(plain.contains(&one) && !plain.contains(&infinity));
+        let light = text(&small(Kind::Illuminant, None));
+        assert!(light.contains(&infinity) && !light.contains(&one));
+        let xyz = text(&only(small(Kind::Reflectance, None), Quantity::Xyz));
+        assert!(xyz.contains("xyz[") && !xyz.contains("spectra") && !xyz.contains("attempts["));
+    }
+}

@@ -1,0 +1,134 @@
+//! The draw as a module of functions, for shaders of others: no bindings, no entry points, and a prefix on every name,
+//! so that several models live in one shader.
+
+use super::tables::Tables;
+use super::text::{Text, list};
+use super::{Form, Target, UNROLLED_GAINS, functions};
+use crate::normal::Real;
+use crate::program::{Level, Program, Source, Unit};
+use crate::quantity::Quantity;
+
+/// Why a recipe has no text.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what the fields are
+pub enum TextError {
+    #[error("{0:?} cannot start a name in WGSL: use letters, digits and single _, a letter first")]
+    Prefix(String),
+    #[error(
+        "{bands} bands x {components} components are too many to write out ({UNROLLED_GAINS} at most): fit fewer, \
+         or let a Sampler draw"
+    )]
+    TooLarge { bands: usize, components: usize },
+    #[error(
+        "intensities of the data are a table, which needs a buffer: ask for log-uniform ones, or let a Sampler draw"
+    )]
+    Table,
+}
+
+/// The module of a program.
+pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, TextError> {
+    let starts_well = prefix.starts_with(|c: char| c.is_ascii_alphabetic());
+    let holds = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if !starts_well || !prefix.chars().all(holds) || prefix.contains("__") || prefix.ends_with('_') {
+        return Err(TextError::Prefix(prefix.to_owned()));
+    }
+    if Form::of(program) == Form::Looped {
+        return Err(TextError::TooLarge { bands: program.bands(), components: program.components() });
+    }
+    if let Some(Level::OneOf(_)) = program.level {
+        return Err(TextError::Table);
+    }
+    let draw = functions(program, &Tables::default(), Target::Baseline);
+    Ok(prefixed(&format!("{draw}\n{}", interface(program)), prefix))
+}
+
+/// What a host calls.
+fn interface(program: &Program) -> String {
+    let attempts = program.max_attempts;
+    let mut text = Text::default();
+    text.line("// Draw `index` (low word, high word) under a seed (the same), as every engine makes it.");
+    text.0 += "fn draw(seed: vec2<u32>, index: vec2<u32>) -> Draw {\n";
+    text.line(&format!("    return draw_of(seed, index, 0u, {attempts}u);\n}}\n"));
+    text.line("// The same, of the stream of this number.");
+    text.0 += "fn draw_in(stream: u32, seed: vec2<u32>, index: vec2<u32>) -> Draw {\n";
+    text.line(&format!("    return draw_of(seed, index, stream << 8u, {attempts}u);\n}}"));
+    for output in &program.outputs {
+        let quantity = output.format.quantity;
+        let width = output.format.width;
+        match &output.source {
+            Source::Spectrum => spectrum(&mut text, program),
+            Source::Map(_, unit) => {
+                let (result, head) = match quantity {
+                    Quantity::Xyz | Quantity::Srgb => ("vec3<f32>".to_owned(), "vec3".to_owned()),
+                    Quantity::Lrv => ("f32".to_owned(), String::new()),
+                    _ => (format!("array<f32, {width}>"), "array".to_owned()),
+                };
+                let values = list(width, |j| format!("{quantity}_{j}(d.z)"));
+                text.block(&format!("fn {quantity}(d: Draw) -> {result}"), |body| {
+                    body.line(&match unit {
+                        Unit::One => format!("return {head}({values});"),
+                        Unit::Scale => format!("return d.scale * {head}({values});"),
+                        Unit::Over(_) => {
+                            let over = format!("max({quantity}_over_0(d.z), {:?}f)", <f32 as Real>::FLOOR);
+                            format!("return (1f / {over}) * {head}({values});")
+                        }
+                    });
+                });
+            }
+            Source::Level => text.block(&format!("fn {quantity}(d: Draw) -> f32"), |body| {
+                body.line("return d.scale;");
+            }),
+            Source::Tally => {} // it is in the Draw
+        }
+    }
+    text.0
+}
+
+fn spectrum(text: &mut Text, program: &Program) {
+    let scale = if program.scales() { " * d.scale" } else { "" };
+    let n = program.bands();
+    text.block(&format!("fn spectrum(d: Draw) -> array<f32, {n}>"), |body| {
+        body.line(&format!("return array({});", list(n, |b| format!("band{b}(d.z){scale}"))));
+    });
+    text.block("fn at(d: Draw, band: u32) -> f32", |body| {
+        body.line("switch band {");
+        (0..n).for_each(|b| body.line(&format!("    case {b}u: {{ return band{b}(d.z){scale}; }}")));
+        body.line("    default: { return 0f; }");
+        body.line("}");
+    });
+}
+
+/// The text with `prefix` before every name that it declares. What follows a dot or comes before a colon is a member
+/// or an argument, and is left alone.
+fn prefixed(text: &str, prefix: &str) -> String {
+    let declared = |line: &str| {
+        let rest = ["fn ", "struct ", "const ", "alias "].iter().find_map(|word| line.strip_prefix(word))?;
+        Some(rest.split(|c: char| !is_name(c)).next().expect("there is a first part").to_owned())
+    };
+    let names: Vec<_> = text.lines().filter_map(declared).collect();
+    let mut result = String::new();
+    for line in text.lines() {
+        let (code, comment) = line.split_at(line.find("//").unwrap_or(line.len()));
+        let mut rest = code;
+        while let Some(start) = rest.find(is_name) {
+            let (before, from) = rest.split_at(start);
+            let (word, after) = from.split_at(from.find(|c| !is_name(c)).unwrap_or(from.len()));
+            result += before;
+            if names.iter().any(|name| name == word) && !before.ends_with('.') && !after.starts_with(':') {
+                result += prefix;
+                result.push('_');
+            }
+            result += word;
+            rest = after;
+        }
+        result += rest;
+        result += comment;
+        result.push('\n');
+    }
+    result
+}
+
+fn is_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_'
+}

@@ -1,0 +1,247 @@
+//! What is stored of the draws of a thread: `fn store`, and the buffers that it writes.
+
+use super::tables::Tables;
+use super::text::Text;
+use super::{Form, OUTPUTS_AT, Target, draws_per_thread};
+use crate::normal::Real;
+use crate::program::{Output, Program, Source, Tally, Unit};
+use crate::quantity::{Element, Format, Layout};
+
+/// How the values of an output make words of its buffer.
+#[derive(Clone, Copy, PartialEq)]
+enum Word {
+    /// A value is a word.
+    Value,
+    /// Two 32-bit values are a word of 64 bits.
+    Pair,
+    /// Two 16-bit values are a word of 32 bits.
+    Halves,
+}
+
+impl Word {
+    fn of(format: &Format, form: Form, target: Target) -> Word {
+        match (format.element, form, target) {
+            (Element::F16, ..) => Word::Halves,
+            (_, Form::Unrolled, Target::SoftwareInt64) => Word::Pair,
+            _ => Word::Value,
+        }
+    }
+
+    fn values(self) -> usize {
+        if self == Word::Value { 1 } else { 2 }
+    }
+
+    fn name(self, element: Element) -> &'static str {
+        match (self, element) {
+            (Word::Value, Element::F32) => "f32",
+            (Word::Value, _) | (Word::Halves, _) => "u32",
+            (Word::Pair, _) => "u64",
+        }
+    }
+
+    /// The word of its values.
+    fn pack(self, element: Element, values: &[String]) -> String {
+        match (self, element, values) {
+            (Word::Value, _, [value]) => value.clone(),
+            (Word::Pair, Element::F32, [low, high]) => format!("float_word({low}, {high})"),
+            (Word::Pair, _, [low, high]) => format!("word({low}, {high})"),
+            (Word::Halves, _, [low, high]) => format!("half({low}) | (half({high}) << 16u)"),
+            _ => unreachable!("a word has as many values as it says"),
+        }
+    }
+}
+
+/// Which value of a row.
+#[derive(Clone, Copy)]
+enum At<'a> {
+    /// This one, in straight lines.
+    Number(usize),
+    /// That of a variable, in a loop.
+    Variable(&'a str),
+}
+
+struct Store<'a> {
+    program: &'a Program,
+    tables: &'a Tables,
+    target: Target,
+    form: Form,
+    /// The names of the thread's draws.
+    draws: &'static [&'static str],
+}
+
+pub(super) fn store(program: &Program, tables: &Tables, target: Target) -> String {
+    let draws: &[_] = if draws_per_thread(program, target) == 2 { &["a", "b"] } else { &["a"] };
+    let store = Store { program, tables, target, form: Form::of(program), draws };
+    let mut text = Text::default();
+    for output in &program.outputs {
+        let Format { quantity, element, .. } = output.format;
+        let word = Word::of(&output.format, store.form, target);
+        text.line(&format!(
+            "@group(0) @binding({}) var<storage, read_write> {quantity}: array<{}>;",
+            OUTPUTS_AT + quantity as u32,
+            word.name(element)
+        ));
+    }
+    let arguments: String = draws.iter().map(|d| format!(", {d}: Draw")).collect();
+    text.block(&format!("fn store(thread: u32{arguments})"), |body| {
+        for d in draws {
+            body.line(&format!("let ok_{d} = {d}.attempts != 0u;"));
+            if store.form == Form::Looped {
+                body.line(&format!("var z_{d} = {d}.z;"));
+            }
+        }
+        for (i, output) in program.outputs.iter().enumerate() {
+            store.output(body, i, output);
+        }
+    });
+    text.0
+}
+
+impl Store<'_> {
+    fn output(&self, body: &mut Text, i: usize, output: &Output) {
+        let format = &output.format;
+        if let Source::Map(_, Unit::Over(_)) = output.source {
+            for d in self.draws {
+                let over = match self.form {
+                    Form::Unrolled => format!("{}_over_0({d}.z)", format.quantity),
+                    Form::Looped => format!("form(&z_{d}, {}u)", self.tables.units[i]),
+                };
+                let floor = <f32 as Real>::FLOOR;
+                body.line(&format!("let {}_unit_{d} = 1f / max({over}, {floor:?}f);", format.quantity));
+            }
+        }
+        match self.form {
+            Form::Looped if format.width > 1 => self.in_a_loop(body, i, output),
+            _ => self.in_lines(body, i, output),
+        }
+    }
+
+    /// A value of a draw, 0 where it failed.
+    fn value(&self, i: usize, output: &Output, d: &str, at: At) -> String {
+        let quantity = output.format.quantity;
+        let form = |name: &str, first: usize| match (self.form, at) {
+            (Form::Unrolled, At::Number(j)) => format!("{name}{j}({d}.z)"),
+            (Form::Looped, At::Number(j)) => format!("form(&z_{d}, {}u)", first + j),
+            (_, At::Variable(j)) => format!("form(&z_{d}, {first}u + {j})"),
+        };
+        let value = match &output.source {
+            Source::Spectrum if self.program.scales() => format!("{} * {d}.scale", form("band", 0)),
+            Source::Spectrum => form("band", 0),
+            Source::Map(_, unit) => {
+                let map = form(&format!("{quantity}_"), self.tables.maps.get(i).copied().unwrap_or(0));
+                match unit {
+                    Unit::One => map,
+                    Unit::Scale => format!("{map} * {d}.scale"),
+                    Unit::Over(_) => format!("{map} * {quantity}_unit_{d}"),
+                }
+            }
+            Source::Level => format!("{d}.scale"),
+            Source::Tally if self.program.may_exceed_one() => {
+                let above_one = format!("ok_{d} && peak(worst({d}.z)) * {d}.scale >= 1f");
+                return format!("{d}.attempts | select(0u, {}u, {above_one})", Tally::ABOVE_ONE);
+            }
+            Source::Tally => return format!("{d}.attempts"),
+        };
+        format!("select(0f, {value}, ok_{d})")
+    }
+
+    fn in_lines(&self, body: &mut Text, i: usize, output: &Output) {
+        let format = &output.format;
+        let Format { quantity, element, width, .. } = *format;
+        let word = Word::of(format, self.form, self.target);
+        // Both draws band by band, so that they share the constants.
+        for (j, d) in (0..width).flat_map(|j| self.draws.iter().map(move |d| (j, d))) {
+            let value = self.value(i, output, d, At::Number(j));
+            body.line(&format!("let {quantity}_{d}{j} = {value};"));
+        }
+        let named = |d: &str, j: usize| match j < width {
+            true => format!("{quantity}_{d}{j}"),
+            false => "0f".to_owned(), // padding
+        };
+        let runs: Vec<(String, Vec<String>)> = match format.layout {
+            Layout::Rows | Layout::PaddedRows => {
+                let values = self.draws.iter().flat_map(|d| (0..format.stride()).map(move |j| named(d, j)));
+                let words = self.draws.len() * format.stride() / word.values();
+                vec![(format!("thread * {words}u"), values.collect())]
+            }
+            Layout::Planes => {
+                let words = self.draws.len() / word.values();
+                let run = |j| {
+                    let plane = plane(word, At::Number(j));
+                    (format!("{plane} + thread * {words}u"), self.draws.iter().map(|d| named(d, j)).collect())
+                };
+                (0..width).map(run).collect()
+            }
+        };
+        for (start, values) in runs {
+            for (at, values) in values.chunks_exact(word.values()).enumerate() {
+                body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(element, values)));
+            }
+        }
+    }
+
+    fn in_a_loop(&self, body: &mut Text, i: usize, output: &Output) {
+        let format = &output.format;
+        let Format { quantity, element, width, .. } = *format;
+        let word = Word::of(format, self.form, self.target);
+        let value = |d: &str, j: &str| self.value(i, output, d, At::Variable(j));
+        match (format.layout, word) {
+            (Layout::Planes, _) => {
+                let words = self.draws.len() / word.values();
+                body.block(&format!("for (var j = 0u; j < {width}u; j++)"), |body| {
+                    let values: Vec<_> = self.draws.iter().map(|d| value(d, "j")).collect();
+                    let start = format!("{} + thread * {words}u", plane(word, At::Variable("j")));
+                    for (at, values) in values.chunks_exact(word.values()).enumerate() {
+                        body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(element, values)));
+                    }
+                });
+            }
+            (_, Word::Halves) => {
+                // A word may have the end of one row and the start of the next.
+                let stride = format.stride();
+                body.block(&format!("for (var at = 0u; at < {stride}u; at++)"), |body| {
+                    body.line("var values = vec2(0f);");
+                    body.block("for (var half_at = 0u; half_at < 2u; half_at++)", |body| {
+                        body.line("let position = 2u * at + half_at;");
+                        for (row, d) in self.draws.iter().enumerate() {
+                            let (first, end) = (row * stride, row * stride + width);
+                            body.block(&format!("if position >= {first}u && position < {end}u"), |body| {
+                                body.line(&format!("let j = position - {first}u;"));
+                                body.line(&format!("values[half_at] = {};", value(d, "j")));
+                            });
+                        }
+                    });
+                    let halves = ["values.x".to_owned(), "values.y".to_owned()];
+                    body.line(&format!(
+                        "{quantity}[thread * {stride}u + at] = {};",
+                        word.pack(element, &halves)
+                    ));
+                });
+            }
+            _ => {
+                let stride = format.stride();
+                for (row, d) in self.draws.iter().enumerate() {
+                    let start = format!("(thread * {}u + {row}u) * {stride}u", self.draws.len());
+                    body.block(&format!("for (var j = 0u; j < {width}u; j++)"), |body| {
+                        body.line(&format!("{quantity}[{start} + j] = {};", value(d, "j")));
+                    });
+                    for j in width..stride {
+                        body.line(&format!("{quantity}[{start} + {j}u] = 0f;"));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Where a plane starts, in words.
+fn plane(word: Word, at: At) -> String {
+    let number = match at {
+        At::Number(j) => format!("{j}u"),
+        At::Variable(j) => j.to_owned(),
+    };
+    match word {
+        Word::Value => format!("{number} * parameters.plane"),
+        Word::Pair | Word::Halves => format!("{number} * (parameters.plane / 2u)"),
+    }
+}
