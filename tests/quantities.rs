@@ -1,0 +1,213 @@
+//! What comes out of a draw, quantity by quantity and layout by layout: the same bytes from every engine, and the
+//! values that f64 gives for the same random words.
+
+use std::sync::OnceLock;
+
+use spectroll::{
+    Bounds, Choice, Draws, Element, Engine, EngineError, Format, Intensity, Layout, Luminance, Model,
+    Quantity, Recipe, RecipeBuilder, Stream, colorimetry,
+};
+
+/// Draws of each recipe: not a multiple of 4, so that planes have padding and pairs a half.
+const COUNT: u64 = 20_003;
+
+fn gpu() -> &'static Engine {
+    static GPU: OnceLock<Engine> = OnceLock::new();
+    GPU.get_or_init(|| Engine::new(&Choice::Gpu).unwrap_or_else(|e| panic!("this needs an adapter: {e}")))
+}
+
+fn cpu() -> Engine {
+    Engine::new(&Choice::Cpu).expect("the CPU is always there")
+}
+
+fn surfaces() -> RecipeBuilder {
+    Recipe::new(&Model::builtin("munsell-vrhel").expect("it is built in"))
+}
+
+fn lights() -> RecipeBuilder {
+    Recipe::new(&Model::builtin("granada").expect("it is built in"))
+}
+
+fn all_but(quantity: Quantity) -> impl Iterator<Item = Quantity> {
+    Quantity::ALL.into_iter().filter(move |q| *q != quantity)
+}
+
+/// Recipes that ask for all that they can.
+fn recipes() -> Vec<(&'static str, Recipe)> {
+    let reflected = |builder: RecipeBuilder| builder.quantities(all_but(Quantity::Intensity));
+    let shining = |builder: RecipeBuilder| builder.quantities(all_but(Quantity::Lrv));
+    let grid = Model::builtin("munsell-vrhel").expect("it is built in").grid();
+    let recipes = [
+        ("reflectances", reflected(surfaces())),
+        ("reflectances under A", reflected(surfaces()).light(&colorimetry::illuminant_a(grid))),
+        ("LRV 0.4", reflected(surfaces()).lrv(0.4)),
+        ("LRV 0.6, scaled", reflected(surfaces()).lrv(0.6).bounds(Bounds::Scaled)),
+        ("log-uniform lights", shining(lights()).intensity(Intensity::LogUniform(0.15, 150.0))),
+        ("measured lights", shining(lights()).intensity(Intensity::Data)),
+        ("lights of intensity 3", shining(lights()).intensity(Intensity::Fixed(3.0))),
+        (
+            "lights of Y = 1",
+            shining(lights()).intensity(Intensity::LogUniform(1e-6, 1e6)).luminance(Luminance::One),
+        ),
+    ];
+    recipes.map(|(name, builder)| (name, builder.build().unwrap_or_else(|e| panic!("{name}: {e}")))).into()
+}
+
+/// The bytes of each quantity of each window, padding left out.
+fn values(engine: &Engine, recipe: &Recipe, draws: Draws) -> Vec<(Format, Vec<u32>)> {
+    let mut all: Vec<(Format, Vec<u32>)> = Vec::new();
+    let made = engine.draw(recipe, draws, |batch| {
+        all.resize_with(batch.formats().len(), || (batch.formats()[0], Vec::new()));
+        for (format, (slot, words)) in batch.formats().iter().zip(&mut all) {
+            *slot = *format;
+            let bytes = batch.bytes(format.quantity);
+            for (i, j) in (0..batch.draws.count as usize).flat_map(|i| (0..format.width).map(move |j| (i, j)))
+            {
+                let at = match format.layout {
+                    Layout::Planes => j * batch.draws.count.next_multiple_of(4) as usize + i,
+                    _ => i * format.stride() + j,
+                };
+                words.push(match format.element {
+                    Element::F16 => u16::from_le_bytes([bytes[2 * at], bytes[2 * at + 1]]).into(),
+                    _ => u32::from_le_bytes(bytes[4 * at..4 * at + 4].try_into().expect("there are 4")),
+                });
+            }
+        }
+        Ok::<_, EngineError>(())
+    });
+    made.unwrap_or_else(|e| panic!("{engine}: {e}"));
+    all
+}
+
+#[test]
+fn every_layout_has_the_same_values_on_every_engine() {
+    let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
+    let layouts = [Layout::Rows, Layout::PaddedRows, Layout::Planes];
+    for (i, layout) in layouts.into_iter().enumerate() {
+        for half in [false, true] {
+            let ask = |builder: RecipeBuilder| {
+                let builder = builder.layout(layout);
+                (if half { builder.half_spectra() } else { builder }).build().expect("it can be drawn")
+            };
+            let recipes = [
+                ask(surfaces().quantities(all_but(Quantity::Intensity)).lrv(0.4)),
+                ask(lights().quantities(all_but(Quantity::Lrv)).intensity(
+                    [Intensity::LogUniform(0.1, 10.0), Intensity::Data, Intensity::Fixed(2.0)][i],
+                )),
+            ];
+            for recipe in recipes {
+                let draws = Stream::new(30).draws(5..5 + COUNT);
+                let ours = values(&cpu(), &recipe, draws);
+                if software {
+                    assert!(ours == values(gpu(), &recipe, draws), "{layout:?}, half: {half}");
+                }
+                let padded = ours.iter().all(|(format, words)| words.len() == format.width * COUNT as usize);
+                assert!(padded, "{layout:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_recipe_has_the_same_values_on_every_engine() {
+    let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
+    for (name, recipe) in recipes() {
+        let draws = Stream::named(31, name).draws(0..COUNT);
+        let (ours, theirs) = (values(&cpu(), &recipe, draws), values(gpu(), &recipe, draws));
+        assert!(!software || ours == theirs, "{name}");
+    }
+}
+
+/// One quantity alone is what it is among all.
+#[test]
+fn quantities_do_not_depend_on_their_company() {
+    let all = surfaces().quantities(all_but(Quantity::Intensity)).lrv(0.4).build().expect("it can be drawn");
+    let draws = Stream::new(32).draws(0..1000);
+    for (format, words) in values(&cpu(), &all, draws) {
+        let alone = surfaces().quantities([format.quantity]).lrv(0.4).build().expect("it can be drawn");
+        for engine in [&cpu(), gpu()] {
+            let found = values(engine, &alone, draws);
+            let found = found.iter().find(|(f, _)| f.quantity == format.quantity);
+            assert!(found == Some(&(format, words.clone())), "{} on {engine}", format.quantity);
+        }
+    }
+}
+
+/// A program in loops has the same quantities, too.
+#[test]
+fn programs_in_loops_have_the_same_values_on_every_engine() {
+    use spectroll::{Builtin, Dataset, Extend, Fit, Kind};
+    let grid = "390:1:730".parse().expect("a grid");
+    let data = Dataset::new(&[Builtin::Vrhel.table()], grid, Extend::Error).expect("the table covers it");
+    let model = Fit::new(Kind::Reflectance).components(7).fit(&data).expect("the data have that rank");
+    let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
+    for layout in [Layout::Rows, Layout::PaddedRows, Layout::Planes] {
+        for half in [false, true] {
+            let builder =
+                Recipe::new(&model).quantities(all_but(Quantity::Intensity)).lrv(0.4).layout(layout);
+            let builder = if half { builder.half_spectra() } else { builder };
+            let recipe = builder.build().expect("it can be drawn");
+            let draws = Stream::new(33).draws(0..1003);
+            let (ours, theirs) = (values(&cpu(), &recipe, draws), values(gpu(), &recipe, draws));
+            assert!(!software || ours == theirs, "{layout:?}, half: {half}");
+        }
+    }
+}
+
+/// Against f64, and against what the f64 spectrum itself says: each quantity's largest error over the draws, in parts
+/// of its own largest value.
+#[test]
+fn values_are_those_of_f64() {
+    for (name, recipe) in recipes() {
+        let grid = recipe.model().grid();
+        let under_a = name.ends_with('A').then(|| colorimetry::illuminant_a(grid));
+        let xyz_weights = match name.contains("lights") {
+            true => colorimetry::cmf(grid).map(|f| f.iter().map(|v| v * grid.step()).collect()),
+            false => {
+                let light = under_a.unwrap_or_else(|| colorimetry::d65(grid));
+                colorimetry::xyz_weights_under(&light, grid).expect("the grid is visible")
+            }
+        };
+        let mut worst = [0f64; Quantity::ALL.len()];
+        let stream = Stream::named(34, name);
+        for index in 0..COUNT {
+            let (ours, exact) = (recipe.draw::<f32>(stream, index), recipe.draw::<f64>(stream, index));
+            if ours.tally() != exact.tally() {
+                continue; // flips are counted elsewhere
+            }
+            let dot = |w: &Vec<f64>| w.iter().zip(exact.spectrum()).map(|(w, s)| w * s).sum::<f64>();
+            let mut xyz = xyz_weights.each_ref().map(dot);
+            if name.ends_with("Y = 1") {
+                xyz = xyz.map(|v| v / xyz[1]);
+            }
+            let srgb = colorimetry::linear_srgb(xyz);
+            for format in recipe.formats() {
+                let quantity = format.quantity;
+                let expected = match quantity {
+                    Quantity::Xyz => &xyz[..],
+                    Quantity::Srgb => &srgb[..],
+                    _ => exact.values(quantity),
+                };
+                let peak = match quantity {
+                    // Components of a saturated colour are small differences.
+                    Quantity::Srgb => xyz[1],
+                    Quantity::Weights => 1.0,
+                    _ => expected.iter().fold(0.0, |a: f64, v| a.max(v.abs())),
+                };
+                for (a, b) in ours.values(quantity).iter().zip(expected) {
+                    let error = (f64::from(*a) - b).abs() / peak;
+                    worst[quantity as usize] = worst[quantity as usize].max(error);
+                }
+                for (a, b) in exact.values(quantity).iter().zip(expected) {
+                    assert!((a - b).abs() <= 1e-11 * peak.max(1.0), "{name}: {quantity} {a} {b}");
+                }
+            }
+        }
+        let listed = recipe.formats().into_iter().map(|f| f.quantity).filter(|q| *q != Quantity::Attempts);
+        let listed: Vec<_> = listed.map(|q| format!("{q} {:.1e}", worst[q as usize])).collect();
+        println!("{name}: {}", listed.join(", "));
+        for quantity in Quantity::ALL {
+            assert!(worst[quantity as usize] < 1e-4, "{name}: {quantity} {:e}", worst[quantity as usize]);
+        }
+    }
+}
