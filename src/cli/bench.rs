@@ -1,18 +1,24 @@
-//! `spectroll bench`: how fast this machine draws.
+//! `spectroll bench`: how fast this machine draws, and what each part of a draw costs.
 //!
-//! In-process rates: spectra are computed and mapped for reading in order, and nothing is done with them. The median
-//! of several runs is what to quote; their spread tells how quiet the machine was.
+//! In-process rates: values are computed and mapped for reading in order, and nothing is done with them. The median of
+//! several runs is what to quote; their spread tells how quiet the machine was.
 
 use std::io::Write;
 use std::time::Instant;
 
 use serde::Serialize;
-use spectroll::{Choice, Engine, Recipe, Stream, adapters};
+use spectroll::{
+    Bounds, Builtin, Choice, Dataset, Engine, Extend, Fit, Grid, Intensity, Kind, Layout, Model, Quantity,
+    Recipe, RecipeBuilder, Stream, adapters,
+};
 
 use super::{EngineArguments, check_interrupt, model, watch_interrupts};
 
 /// How long one run should take, seconds.
 const RUN: f64 = 0.4;
+
+/// The same where there are many recipes to measure.
+const SHORT_RUN: f64 = 0.1;
 
 /// Measure how fast spectra are drawn, by every adapter and by the CPU
 #[derive(clap::Args)]
@@ -22,6 +28,9 @@ pub(crate) struct Arguments {
     model: String,
     #[command(flatten)]
     engine: EngineArguments,
+    /// Measure what each quantity, rule and size of model costs, of the built-in models
+    #[arg(long, conflicts_with = "model")]
+    costs: bool,
     /// How many runs
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(5..))]
     runs: u32,
@@ -33,10 +42,12 @@ pub(crate) struct Arguments {
 /// The rates of one engine, million draws a second.
 #[derive(Serialize)]
 struct Rates {
-    model: String,
+    recipe: String,
     engine: String,
     bands: usize,
     components: usize,
+    bytes_per_draw: u64,
+    acceptance: f64,
     draws_per_run: u64,
     median: f64,
     least: f64,
@@ -44,27 +55,41 @@ struct Rates {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let choice = arguments.engine.choice();
-    let model = model(&arguments.model)?;
-    let recipe = Recipe::new(&model).build()?;
-    let choices = match choice {
+    let choices = match arguments.engine.choice() {
         Some(choice) => vec![choice],
         None => (0..adapters().len()).map(|i| Choice::Adapter(i.to_string())).chain([Choice::Cpu]).collect(),
     };
+    let recipes = match arguments.costs {
+        true => costs()?,
+        false => vec![(arguments.model.clone(), Recipe::new(&model(&arguments.model)?))],
+    };
+    let recipes = recipes.into_iter().map(|(name, builder)| Ok((name, builder.build()?)));
+    let recipes = recipes.collect::<anyhow::Result<Vec<_>>>()?;
+    let seconds = if arguments.costs { SHORT_RUN } else { RUN };
+    let width = recipes.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     watch_interrupts();
     let mut all = Vec::new();
     for choice in choices {
         let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
-        let rates = measure(&engine, &recipe, arguments)?;
-        if !arguments.json {
-            let mut out = std::io::stdout();
-            writeln!(
-                out,
-                "{:8.2} million/s (least {:.2}, most {:.2}; {} runs of {})  {}",
-                rates.median, rates.least, rates.most, arguments.runs, rates.draws_per_run, rates.engine
-            )?;
+        if arguments.costs && !arguments.json {
+            writeln!(std::io::stdout(), "{engine}, million draws a second:")?;
         }
-        all.push(rates);
+        for (name, recipe) in &recipes {
+            let rates = measure(&engine, name, recipe, arguments.runs, seconds)?;
+            if !arguments.json {
+                let Rates { median, least, most, draws_per_run, engine, .. } = &rates;
+                let mut out = std::io::stdout();
+                match arguments.costs {
+                    true => writeln!(out, "  {name:width$}  {median:7.2} ({least:.2} to {most:.2})")?,
+                    false => writeln!(
+                        out,
+                        "{median:8.2} million/s (least {least:.2}, most {most:.2}; {} runs of {draws_per_run})  {engine}",
+                        arguments.runs
+                    )?,
+                }
+            }
+            all.push(rates);
+        }
     }
     if arguments.json {
         writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&all)?)?;
@@ -72,7 +97,45 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn measure(engine: &Engine, recipe: &Recipe, arguments: &Arguments) -> anyhow::Result<Rates> {
+/// Recipes that differ from the first in one thing each.
+fn costs() -> anyhow::Result<Vec<(String, RecipeBuilder)>> {
+    let (surface, light) = (Model::builtin("munsell-vrhel")?, Model::builtin("granada")?);
+    let surfaces = || Recipe::new(&surface);
+    let lights = || Recipe::new(&light);
+    let of = |grid: &str, components| {
+        let tables = [Builtin::Munsell.table(), Builtin::Vrhel.table()];
+        let data = Dataset::new(&tables, grid.parse::<Grid>()?, Extend::Error)?;
+        anyhow::Ok(Recipe::new(&Fit::new(Kind::Reflectance).components(components).fit(&data)?))
+    };
+    let everything = Quantity::ALL.into_iter().filter(|q| *q != Quantity::Intensity);
+    Ok([
+        ("reflectances: spectra, 31 bands, 6 components", surfaces()),
+        ("  attempts alone", surfaces().quantities([Quantity::Attempts])),
+        ("  lrv", surfaces().quantities([Quantity::Lrv])),
+        ("  xyz", surfaces().quantities([Quantity::Xyz])),
+        ("  srgb", surfaces().quantities([Quantity::Srgb])),
+        ("  weights", surfaces().quantities([Quantity::Weights])),
+        ("  everything", surfaces().quantities(everything)),
+        ("  spectra in 16 bits", surfaces().half_spectra()),
+        ("  spectra in padded rows", surfaces().layout(Layout::PaddedRows)),
+        ("  spectra in planes", surfaces().layout(Layout::Planes)),
+        ("  spectra, nothing rejected (covariance x 0.01)", surfaces().covariance_scale(0.01)),
+        ("  spectra, covariance x 4", surfaces().covariance_scale(4.0)),
+        ("  spectra at LRV 0.4, base", surfaces().lrv(0.4)),
+        ("  spectra at LRV 0.4, scaled", surfaces().lrv(0.4).bounds(Bounds::Scaled)),
+        ("  spectra, 3 components", of("400:10:700", 3)?),
+        ("  spectra, 12 components", of("400:10:700", 12)?),
+        ("  spectra, 61 bands", of("400:5:700", 6)?),
+        ("illuminants: spectra", lights()),
+        ("  spectra of log-uniform intensity", lights().intensity(Intensity::LogUniform(0.15, 150.0))),
+        ("  spectra of the data's intensities", lights().intensity(Intensity::Data)),
+        ("  xyz", lights().quantities([Quantity::Xyz])),
+    ]
+    .map(|(name, builder)| (name.to_owned(), builder))
+    .into())
+}
+
+fn measure(engine: &Engine, name: &str, recipe: &Recipe, runs: u32, seconds: f64) -> anyhow::Result<Rates> {
     let mut drawer = engine.drawer(recipe)?;
     let mut time = |count: u64| {
         let start = Instant::now();
@@ -82,16 +145,17 @@ fn measure(engine: &Engine, recipe: &Recipe, arguments: &Arguments) -> anyhow::R
     // The first run pays for compiling the shader; the second says how many draws fill the time.
     time(1)?;
     let trial = 200_000;
-    let count = (trial as f64 * RUN / time(trial)?) as u64;
-    let mut rates = (0..arguments.runs)
-        .map(|_| Ok(count as f64 / time(count)? / 1e6))
-        .collect::<anyhow::Result<Vec<f64>>>()?;
+    let count = (trial as f64 * seconds / time(trial)?).max(1.0) as u64;
+    let mut rates =
+        (0..runs).map(|_| Ok(count as f64 / time(count)? / 1e6)).collect::<anyhow::Result<Vec<f64>>>()?;
     rates.sort_by(f64::total_cmp);
     Ok(Rates {
-        model: arguments.model.clone(),
+        recipe: name.trim().to_owned(),
         engine: engine.to_string(),
         bands: recipe.model().bands(),
         components: recipe.model().components(),
+        bytes_per_draw: recipe.formats().iter().map(|format| format.bytes(4) / 4).sum(),
+        acceptance: recipe.acceptance(),
         draws_per_run: count,
         median: rates[rates.len() / 2],
         least: rates[0],

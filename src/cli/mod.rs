@@ -6,7 +6,9 @@ mod bench;
 mod fit;
 mod inspect;
 mod picture;
+mod recipe;
 mod sample;
+mod shader;
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -15,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, Subcommand, ValueEnum};
 use spectroll::output::Existing;
-use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, RecipeError};
+use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, RecipeError, TextError};
 
 /// Draws random, physically valid natural spectra on the GPU.
 #[derive(Parser)]
@@ -31,6 +33,7 @@ Examples:
   spectroll sample granada -n 1000 -o - --seed 7 > daylights.csv
   spectroll sample munsell-vrhel -n 10000 --lrv 0.4 --bounds scaled -o targets.npy
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
+  spectroll shader granada --quantities srgb --prefix sun > sun.wgsl
   spectroll inspect munsell-vrhel -o munsell-vrhel.png
 
 Exit codes: 0 done, 1 failed while running, 2 wrong usage or impossible request, 3 no such adapter,
@@ -41,6 +44,7 @@ enum Command {
     Fit(fit::Arguments),
     Sample(sample::Arguments),
     Inspect(inspect::Arguments),
+    Shader(shader::Arguments),
     Adapters(adapters::Arguments),
     Bench(bench::Arguments),
 }
@@ -106,6 +110,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Fit(arguments) => fit::run(arguments),
         Command::Sample(arguments) => sample::run(arguments),
         Command::Inspect(arguments) => inspect::run(arguments),
+        Command::Shader(arguments) => shader::run(arguments),
         Command::Adapters(arguments) => adapters::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
     };
@@ -127,7 +132,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         3
     } else if error.is::<DatasetError>() || error.is::<FitError>() || error.is::<ModelError>() {
         4
-    } else if error.is::<RecipeError>() || error.is::<Usage>() {
+    } else if error.is::<RecipeError>() || error.is::<TextError>() || error.is::<Usage>() {
         2
     } else {
         1

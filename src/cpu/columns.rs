@@ -6,7 +6,7 @@ use half::slice::HalfFloatSliceExt;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::{Kernel, Value};
+use super::{Candidates, Kernel, Take, Value};
 use crate::program::Tally;
 use crate::quantity::{Element, Format, Layout};
 use crate::stream::Draws;
@@ -65,11 +65,25 @@ fn fill_chunk(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
 }
 
 #[inline(always)]
-fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws, mut columns: Vec<Column>) {
+fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
     let widest = kernel.outputs.iter().map(|output| output.format.width).max().unwrap_or(0);
-    let mut row = vec![0.0; widest];
-    kernel.in_lanes::<L>(draws, |number, lane, candidates, tally| {
-        for ((output, column), maps) in kernel.outputs.iter().zip(&mut columns).zip(&candidates.maps) {
+    kernel.in_lanes::<L>(draws, &mut Filling { kernel, columns, row: vec![0.0; widest] });
+}
+
+/// The columns that draws go into.
+struct Filling<'a> {
+    kernel: &'a Kernel<f32>,
+    columns: Vec<Column<'a>>,
+    /// Room for what is not stored as it is.
+    row: Vec<f32>,
+}
+
+impl<const L: usize> Take<f32, L> for Filling<'_> {
+    #[inline(always)]
+    fn take(&mut self, number: usize, lane: usize, candidates: &Candidates<f32, L>, tally: Tally) {
+        for ((output, column), maps) in
+            self.kernel.outputs.iter().zip(&mut self.columns).zip(&candidates.maps)
+        {
             let values = match output.value {
                 Value::Tally => {
                     column.planes[0][number] = bytemuck::cast(tally);
@@ -79,9 +93,9 @@ fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws, mut columns
                 Value::Map(..) => maps,
                 Value::Level => std::slice::from_ref(&candidates.scale),
             };
-            column.put(number, values, lane, tally, &mut row);
+            column.put(number, values, lane, tally, &mut self.row);
         }
-    });
+    }
 }
 
 impl Column<'_> {

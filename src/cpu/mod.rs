@@ -78,6 +78,14 @@ struct Candidates<R, const L: usize> {
     maps: Vec<Vec<[R; L]>>,
 }
 
+/// Where draws go. A trait and not a closure, which could not be told to be inlined: what is not inlined is compiled
+/// for the least of all machines.
+trait Take<R, const L: usize> {
+    /// Takes draw `number`, from the first on, which is in a lane of the candidates. Where it failed they are those of
+    /// its last attempt.
+    fn take(&mut self, number: usize, lane: usize, candidates: &Candidates<R, L>, tally: Tally);
+}
+
 /// What candidates came to, a lane each.
 struct Verdicts<const L: usize> {
     accepted: [bool; L],
@@ -121,19 +129,24 @@ impl<R: Real> Kernel<R> {
 
     /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
     pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, Tally) {
-        let mut drawn = (Vec::new(), Tally::FAILED);
-        self.in_lanes::<1>(Draws { stream, first: index, count: 1 }, |_, _, candidates, tally| {
-            drawn = (self.values(candidates, tally), tally);
-        });
-        drawn
+        struct Only<'a, R>(&'a Kernel<R>, Option<(Vec<Vec<R>>, Tally)>);
+        impl<R: Real> Take<R, 1> for Only<'_, R> {
+            fn take(&mut self, _: usize, _: usize, candidates: &Candidates<R, 1>, tally: Tally) {
+                self.1 = Some((self.0.values(candidates, tally), tally));
+            }
+        }
+        let mut only = Only(self, None);
+        self.in_lanes(Draws { stream, first: index, count: 1 }, &mut only);
+        only.1.expect("one draw was asked for")
     }
 
     /// The candidate of the words that `block` gives for each block, as the values of each output; `None` where it is
     /// rejected.
-    pub(crate) fn candidate(&self, block: impl FnMut(u32) -> [u32; 4]) -> Option<Vec<Vec<R>>> {
-        let mut block = block;
+    pub(crate) fn candidate(&self, mut block: impl FnMut(u32) -> [u32; 4]) -> Option<Vec<Vec<R>>> {
         let mut candidates = self.candidates::<1>();
-        let verdicts = self.judge(&mut candidates, |b| block(b).map(|word| [word]));
+        make_normals(&mut candidates.normals, |b| block(b).map(|word| [word]));
+        let word = self.level.as_ref().map(|_| [block(level::BLOCK)[0]]);
+        let verdicts = self.judge(&mut candidates, word);
         verdicts.accepted[0].then(|| self.values(&candidates, Tally::accepted(1, false)))
     }
 
@@ -157,14 +170,9 @@ impl<R: Real> Kernel<R> {
         values.map(zero_where_failed).collect()
     }
 
-    /// Makes all of `draws`, and hands each to `take` when it is done: its number from the first on, and the lane of
-    /// the candidates that has it. Where it failed the candidates are those of its last attempt.
+    /// Makes all of `draws`, each of which goes to `to` when it is done.
     #[inline(always)]
-    fn in_lanes<const L: usize>(
-        &self,
-        draws: Draws,
-        mut take: impl FnMut(usize, usize, &Candidates<R, L>, Tally),
-    ) {
+    fn in_lanes<const L: usize>(&self, draws: Draws, to: &mut impl Take<R, L>) {
         let mut candidates = self.candidates::<L>();
         let mut numbers = 0..draws.count as usize;
         let mut lanes: [_; L] = std::array::from_fn(|_| numbers.next());
@@ -175,20 +183,19 @@ impl<R: Real> Kernel<R> {
             [low[l], high[l]] = words(lanes[l]);
         }
         while lanes.iter().any(Option::is_some) {
-            let verdicts = self.judge(&mut candidates, |b| match b {
-                level::BLOCK => draws.stream.blocks([low, high], [0; L], b),
-                _ => draws.stream.blocks([low, high], attempts, b),
-            });
+            let index = [low, high];
+            make_normals(&mut candidates.normals, |b| draws.stream.blocks(index, attempts, b));
+            let word = self.level.as_ref().map(|_| draws.stream.blocks(index, [0; L], level::BLOCK)[0]);
+            let verdicts = self.judge(&mut candidates, word);
             for l in 0..L {
                 let Some(number) = lanes[l] else { continue };
                 attempts[l] += 1;
-                if verdicts.accepted[l] {
-                    take(number, l, &candidates, Tally::accepted(attempts[l], verdicts.above_one[l]));
-                } else if attempts[l] == self.max_attempts {
-                    take(number, l, &candidates, Tally::FAILED);
-                } else {
-                    continue;
-                }
+                let tally = match verdicts.accepted[l] {
+                    true => Tally::accepted(attempts[l], verdicts.above_one[l]),
+                    false if attempts[l] == self.max_attempts => Tally::FAILED,
+                    false => continue,
+                };
+                to.take(number, l, &candidates, tally);
                 attempts[l] = 0;
                 lanes[l] = numbers.next();
                 [low[l], high[l]] = words(lanes[l]);
@@ -209,14 +216,13 @@ impl<R: Real> Kernel<R> {
         }
     }
 
-    /// Makes the candidates of the words that `block` gives for each block, and judges them.
+    /// Makes the candidates of the normals, and of the words of their levels if there are any, and judges them.
     #[inline(always)]
     fn judge<const L: usize>(
         &self,
         candidates: &mut Candidates<R, L>,
-        mut block: impl FnMut(u32) -> [[u32; L]; 4],
+        word: Option<[u32; L]>,
     ) -> Verdicts<L> {
-        make_normals(&mut candidates.normals, &mut block);
         let mut physical = Range::new();
         for (b, s) in candidates.spectrum.iter_mut().enumerate() {
             *s = self.spectrum.value(b, &candidates.normals);
@@ -233,8 +239,7 @@ impl<R: Real> Kernel<R> {
                 verdicts.accepted[l] &= !self.tests_scaled || peak < R::ONE;
                 verdicts.above_one[l] = self.may_exceed_one && peak >= R::ONE;
             }
-        } else if let Some(level) = &self.level {
-            let [word, ..] = block(level::BLOCK);
+        } else if let Some((level, word)) = self.level.as_ref().zip(word) {
             candidates.scale = word.map(|word| level.of(word));
         }
         if self.scales_spectra {

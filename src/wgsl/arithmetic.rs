@@ -72,8 +72,7 @@ fn draw_level(body: &mut Text, level: &Level, tables: &Tables) {
 fn unrolled(program: &Program) -> Text {
     let (n, k) = (program.bands(), program.components());
     let mut text = Text::default();
-    text.line(&format!("struct Normals {{ {} }}", list(k, |j| format!("z{j}: f32"))));
-    text.line(&format!("struct Bands {{ {} }}", list(n, |b| format!("b{b}: f32"))));
+    text.line(&format!("alias Normals = array<f32, {k}>;"));
     text.block(
         "fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Normals",
         |body| {
@@ -90,19 +89,15 @@ fn unrolled(program: &Program) -> Text {
     );
     text.line("");
     forms(&mut text, "band", &program.spectrum);
-    text.block("fn bands(z: Normals) -> Bands", |body| {
-        body.line(&format!("return Bands({});", list(n, |b| format!("band{b}(z)"))));
-    });
     text.block("fn worst(z: Normals) -> u32", |body| {
-        body.line("let s = bands(z);");
         body.line("var e = 0u;");
-        (0..n).for_each(|b| body.line(&format!("e = max(e, excess(s.b{b}));")));
+        (0..n).for_each(|b| body.line(&format!("e = max(e, excess(band{b}(z)));")));
         body.line("return e;");
     });
     if let Some(target) = &program.target {
         text.block("fn luminance(z: Normals) -> f32", |body| {
-            body.line("let s = bands(z);");
-            let products = target.weights.iter().enumerate().map(|(b, w)| format!("{} * s.b{b}", float(*w)));
+            let products =
+                target.weights.iter().enumerate().map(|(b, w)| format!("{} * band{b}(z)", float(*w)));
             body.line(&format!("return {};", products.collect::<Vec<_>>().join(" + ")));
         });
     }
@@ -123,7 +118,7 @@ fn unrolled(program: &Program) -> Text {
 fn forms(text: &mut Text, name: &str, map: &Affine) {
     for (row, &offset) in map.offset.iter().enumerate() {
         let gains = map.gain.iter().map(|gain| gain[row]).enumerate().filter(|(_, g)| *g as f32 != 0.0);
-        let terms: String = gains.map(|(j, g)| format!(" + {} * z.z{j}", float(g))).collect();
+        let terms: String = gains.map(|(j, g)| format!(" + {} * z[{j}]", float(g))).collect();
         text.line(&format!("fn {name}{row}(z: Normals) -> f32 {{ return {}{terms}; }}", float(offset + 0.0)));
     }
 }

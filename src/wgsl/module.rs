@@ -40,6 +40,9 @@ pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, TextErro
         return Err(TextError::Table);
     }
     let draw = functions(program, &Tables::default(), Target::Baseline);
+    // What naga_oil imports may name structures, but no other types.
+    let normals = format!("array<f32, {}>", program.components());
+    let draw = draw.replace(&format!("alias Normals = {normals};\n"), "").replace("Normals", &normals);
     Ok(prefixed(&format!("{draw}\n{}", interface(program)), prefix))
 }
 
