@@ -8,6 +8,8 @@ struct Parameters {
     max_attempts: u32,
     // How many values there are from one plane to the next.
     plane: u32,
+    // How many draws a row has; 0 where there are no rows.
+    row: u32,
 }
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
@@ -16,6 +18,9 @@ struct Parameters {
 fn draw_at(i: u32) -> Draw {
     let low = parameters.first.x + i;
     let carry = select(0u, 1u, low < i);
-    let index = vec2(low, parameters.first.y + carry);
+    var index = vec2(low, parameters.first.y + carry);
+    if parameters.row != 0u {
+        index = vec2(low % parameters.row, parameters.first.y + low / parameters.row);
+    }
     return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts);
 }

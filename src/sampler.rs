@@ -7,7 +7,7 @@ use wgpu::{BufferUsages, Device};
 use crate::program::Program;
 use crate::quantity::{Format, Quantity};
 use crate::recipe::Recipe;
-use crate::stream::{self, Draws};
+use crate::stream::Draws;
 use crate::wgsl::{self, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Target};
 
 /// A recipe's compute pipeline on a wgpu device, to be recorded into its host's command encoders.
@@ -67,6 +67,8 @@ struct Parameters {
     stream: u32,
     max_attempts: u32,
     plane: u32,
+    row: u32,
+    padding: [u32; 3],
 }
 
 impl Sampler {
@@ -129,7 +131,7 @@ impl Sampler {
             (4 * (limits.max_storage_buffer_binding_size / four), "max_storage_buffer_binding_size"),
             (4 * (limits.max_buffer_size / four), "max_buffer_size"),
             (threads * u64::from(self.draws_per_thread), "max_compute_workgroups_per_dimension"),
-            (4 * (u64::from(u32::MAX) / values), "32-bit offsets"),
+            (4 * (u64::from(u32::MAX) / values.max(8)), "32-bit offsets"),
         ]
         .into_iter()
         .min()
@@ -186,11 +188,13 @@ impl Sampler {
     fn parameters(&self, draws: Draws) -> Parameters {
         Parameters {
             key: draws.stream.key(),
-            first: stream::words(draws.first),
+            first: draws.stream.index_words(draws.first),
             count: draws.count as u32, // `limit` keeps it below 2^32
             stream: draws.stream.id() << 8,
             max_attempts: self.max_attempts,
             plane: draws.count.next_multiple_of(4) as u32,
+            row: draws.stream.row(),
+            padding: [0; 3],
         }
     }
 }

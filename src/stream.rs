@@ -5,6 +5,9 @@
 //! candidates of draw i, of which the first acceptable one wins. Blocks 0, 1, ... of an attempt hold the words of its
 //! normals, four a block; block 255 of attempt 0 is kept for uniforms that belong to a draw rather than to an
 //! attempt, and block 254 of attempt 0 feeds [`StreamRng`].
+//!
+//! Where draws come in rows, as the objects of scenes do, the row is the high word of i and the place in it the low
+//! one. A row can then be drawn alone, and may grow or shrink without changing another draw.
 
 use std::convert::Infallible;
 use std::ops::{Bound, RangeBounds};
@@ -22,12 +25,14 @@ const RNG_BLOCK: u32 = 254;
 pub struct Stream {
     seed: u64,
     id: u32,
+    /// How many draws a row has; 0 where there are no rows.
+    row: u32,
 }
 
 impl Stream {
     /// The stream 0 of a seed.
     pub const fn new(seed: u64) -> Stream {
-        Stream { seed, id: 0 }
+        Stream { seed, id: 0, row: 0 }
     }
 
     /// The stream of a name, so that adding a group of draws to a scene does not change another: its 32-bit FNV-1a
@@ -35,7 +40,38 @@ impl Stream {
     pub fn named(seed: u64, name: &str) -> Stream {
         let hash =
             name.bytes().fold(0x811C_9DC5, |h: u32, byte| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193));
-        Stream { seed, id: (hash >> 24) ^ (hash & 0x00FF_FFFF) }
+        Stream { seed, id: (hash >> 24) ^ (hash & 0x00FF_FFFF), row: 0 }
+    }
+
+    /// The same stream, in rows of `length` draws: index i is then draw i % length of row i / length, and what that
+    /// draw is does not depend on the length.
+    ///
+    /// ```
+    /// use spectroll::Stream;
+    ///
+    /// let (short, long) = (Stream::new(1).in_rows(3), Stream::new(1).in_rows(1000));
+    /// assert_eq!(short.block(2 * 3 + 1, 0, 0), long.block(2 * 1000 + 1, 0, 0));
+    /// ```
+    ///
+    /// # Panics
+    /// Where the length is 0 or above 2^31.
+    pub fn in_rows(self, length: u32) -> Stream {
+        assert!((1..=1 << 31).contains(&length), "a row has 1 to 2^31 draws, not {length}");
+        Stream { row: length, ..self }
+    }
+
+    /// The length of rows; 0 where there are none.
+    pub(crate) fn row(&self) -> u32 {
+        self.row
+    }
+
+    /// The words of the counter that stand for draw `index`: its low and high ones, or its place and its row.
+    #[inline(always)]
+    pub(crate) fn index_words(&self, index: u64) -> [u32; 2] {
+        match self.row {
+            0 => words(index),
+            row => [(index % u64::from(row)) as u32, (index / u64::from(row)) as u32],
+        }
     }
 
     /// The seed.
@@ -57,10 +93,10 @@ impl Stream {
     /// The four words of a block, below 256, of an attempt of draw `index`.
     pub fn block(&self, index: u64, attempt: u32, block: u32) -> [u32; 4] {
         assert!(block < 256, "block {block} would be one of another stream");
-        self.blocks(words(index).map(|word| [word]), [attempt], block).map(|[word]| word)
+        self.blocks(self.index_words(index).map(|word| [word]), [attempt], block).map(|[word]| word)
     }
 
-    /// The same in L lanes: indices as their low and their high words, and an attempt for each.
+    /// The same in L lanes: indices as [`Stream::index_words`], and an attempt for each.
     #[inline(always)]
     pub(crate) fn blocks<const L: usize>(
         &self,
@@ -97,7 +133,7 @@ impl Stream {
 
 /// The low and high words of a 64-bit number: the order in which the counter and the shader hold them.
 #[inline(always)]
-pub(crate) fn words(x: u64) -> [u32; 2] {
+fn words(x: u64) -> [u32; 2] {
     [x as u32, (x >> 32) as u32]
 }
 
@@ -170,9 +206,11 @@ mod tests {
 
     #[test]
     fn the_counter_holds_index_attempt_stream_and_block() {
-        let stream = Stream { seed: 0x0123_4567_89AB_CDEF, id: 0x00AB_CDEF };
+        let stream = Stream { seed: 0x0123_4567_89AB_CDEF, id: 0x00AB_CDEF, row: 0 };
         let expected = philox([0x5566_7788, 0x1122_3344, 9, 0xABCD_EF03], [0x89AB_CDEF, 0x0123_4567]);
         assert_eq!(stream.block(0x1122_3344_5566_7788, 9, 3), expected);
+        let row = stream.in_rows(1000);
+        assert_eq!(row.block(7 * 1000 + 5, 9, 3), stream.block(7 << 32 | 5, 9, 3));
     }
 
     #[test]

@@ -249,6 +249,20 @@ fn any_index_seed_and_stream() {
     assert_eq!(around.spectra[5 * case.recipe.model().bands()..], from_zero.spectra);
 }
 
+/// Rows of any length, in windows that start anywhere in one.
+#[test]
+fn draws_in_rows() {
+    let case = Case::plain(&builtin("munsell-vrhel"));
+    let stream = Stream::named(11, "background");
+    for length in [1, 3, 999] {
+        let first = 4 * u64::from(length) + u64::from(length) / 2;
+        let rows = assert_twins(&case, stream.in_rows(length).draws(first..first + 4099));
+        let (row, place) = ((first + 4000) / u64::from(length), (first + 4000) % u64::from(length));
+        let alone = case.recipe.draw::<f32>(stream, row << 32 | place);
+        assert_eq!(rows.spectra[4000 * 31..4001 * 31], *alone.spectrum());
+    }
+}
+
 #[test]
 fn any_split_gives_the_same_bytes() {
     let case = Case::new(&builtin("munsell-vrhel"), Some((0.6, Bounds::Both)), 1.0);

@@ -18,7 +18,7 @@ use crate::level::{self, Level};
 use crate::normal::Real;
 use crate::program::{self, Affine, Program, Source, Tally};
 use crate::quantity::Format;
-use crate::stream::{self, Draws, Stream};
+use crate::stream::{Draws, Stream};
 
 /// A [`Program`] with its numbers rounded to `R`.
 pub(crate) struct Kernel<R> {
@@ -177,7 +177,9 @@ impl<R: Real> Kernel<R> {
         let mut numbers = 0..draws.count as usize;
         let mut lanes: [_; L] = std::array::from_fn(|_| numbers.next());
         // A lane without a draw goes on with the first, to no effect.
-        let words = |lane: Option<usize>| stream::words(draws.first.wrapping_add(lane.unwrap_or(0) as u64));
+        let words = |lane: Option<usize>| {
+            draws.stream.index_words(draws.first.wrapping_add(lane.unwrap_or(0) as u64))
+        };
         let (mut low, mut high, mut attempts) = ([0; L], [0; L], [0; L]);
         for l in 0..L {
             [low[l], high[l]] = words(lanes[l]);
