@@ -11,6 +11,7 @@ pub mod colorimetry;
 mod fit;
 mod model;
 
+mod condition;
 mod program;
 mod quantity;
 mod region;
@@ -33,6 +34,8 @@ mod engine;
 mod probe;
 
 pub mod output;
+
+pub mod scene;
 
 pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
 pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, adapters};
