@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::{Batch, EngineError, Pace};
 use crate::cpu::{self, Kernel};
-use crate::quantity::Format;
+use crate::quantity::{Format, Quantity};
 use crate::recipe::Recipe;
 use crate::stream::Draws;
 
@@ -29,6 +29,31 @@ impl<'a> Drawer<'a> {
         let program = recipe.program().tallied();
         let formats = program.outputs.iter().map(|output| output.format).collect();
         Drawer { pool, recipe, kernel: Kernel::new(&program), formats, windows: Vec::new() }
+    }
+
+    /// Makes `draws` with their spectra in the caller's memory, which has as many words as they need, and hands them to
+    /// `sink` as one batch.
+    pub(super) fn fill<E>(
+        &mut self,
+        draws: Draws,
+        spectra: &mut [u32],
+        sink: &mut impl FnMut(Batch) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let words = |format: &Format| format.bytes(draws.count).div_ceil(4) as usize;
+        let is_spectra = |format: &&Format| format.quantity == Quantity::Spectra;
+        let mut others: Vec<_> =
+            self.formats.iter().filter(|f| !is_spectra(f)).map(|format| vec![0; words(format)]).collect();
+        let mut spectra = Some(spectra);
+        let mut rest = others.iter_mut();
+        let mut arrays: Vec<&mut [u32]> = Vec::new();
+        for format in &self.formats {
+            arrays.push(match is_spectra(&format) {
+                true => spectra.take().expect("each quantity is there once"),
+                false => rest.next().expect("there is one for each"),
+            });
+        }
+        self.pool.install(|| cpu::fill(&self.kernel, draws, &mut arrays));
+        sink(Batch::new(draws, &self.formats, arrays.iter().map(|words| bytemuck::cast_slice(words))))
     }
 
     pub(super) fn draw<E: From<EngineError>>(
@@ -76,7 +101,8 @@ fn compute(
         for (format, words) in formats.iter().zip(&mut window) {
             words.resize(format.bytes(part.count).div_ceil(4) as usize, 0);
         }
-        pool.install(|| cpu::fill(kernel, part, &mut window));
+        let mut arrays: Vec<_> = window.iter_mut().map(Vec::as_mut_slice).collect();
+        pool.install(|| cpu::fill(kernel, part, &mut arrays));
         pace.learn(part.count, start);
         offset += part.count;
         if full.send((part, window)).is_err() {
