@@ -17,6 +17,10 @@ mod region;
 mod normal;
 mod philox;
 mod stream;
+mod truncated;
+
+#[allow(dead_code)]
+mod cover;
 
 mod cpu;
 mod recipe;

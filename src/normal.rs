@@ -12,6 +12,8 @@ use std::f32::consts::LN_2;
 use std::f64::consts::{SQRT_2, TAU};
 use std::ops::{Add, Div, Mul};
 
+use crate::truncated;
+
 /// A floating-point type that draws can be computed in: f32, the shader's twin, or f64, its oracle.
 pub trait Real:
     Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Send + Sync + 'static
@@ -28,6 +30,11 @@ pub trait Real:
     fn from_f64(value: f64) -> Self;
     /// Two independent standard normals of two independent uniform words.
     fn normal_pair(x: u32, y: u32) -> [Self; 2];
+    /// A coordinate of a box, of a uniform word: relative to a centre, and what it costs. The four numbers of an axis
+    /// and the cost are those of `src/truncated.rs`.
+    fn truncated(axis: [Self; 4], word: u32) -> [Self; 2];
+    /// -2 ln u of a uniform word u: a chi-square of two degrees of freedom.
+    fn chi_square(word: u32) -> Self;
 }
 
 impl Real for f32 {
@@ -45,6 +52,16 @@ impl Real for f32 {
         let r = radius(x);
         circle(y).map(|v| r * v)
     }
+
+    #[inline(always)]
+    fn truncated(axis: [f32; 4], word: u32) -> [f32; 2] {
+        truncated::truncated(axis, word)
+    }
+
+    #[inline(always)]
+    fn chi_square(word: u32) -> f32 {
+        truncated::chi_square(word)
+    }
 }
 
 impl Real for f64 {
@@ -61,12 +78,20 @@ impl Real for f64 {
         let r = exact_radius(x);
         exact_circle(y).map(|v| r * v)
     }
+
+    fn truncated(axis: [f64; 4], word: u32) -> [f64; 2] {
+        truncated::exact_truncated(axis, word)
+    }
+
+    fn chi_square(word: u32) -> f64 {
+        truncated::exact_chi_square(word)
+    }
 }
 
 /// log(1 + t) for t in [sqrt(1/2) - 1, sqrt(2) - 1]. The coefficients are a minimax fit in f64, rounded one by one
 /// with the rest fitted again; relative error of the polynomial 3e-8.
 #[inline(always)]
-fn log1p_reduced(t: f32) -> f32 {
+pub(crate) fn log1p_reduced(t: f32) -> f32 {
     let mut p = 0.087404214;
     p = p * t - 0.14309816;
     p = p * t + 0.14916772;
