@@ -18,7 +18,8 @@ mod partition;
 mod proposal;
 mod simplex;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
+mod text;
 
 use alias::{Alias, odds};
 use hat::Axis;

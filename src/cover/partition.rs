@@ -3,7 +3,7 @@
 use std::collections::BinaryHeap;
 
 use super::hat::normal_mass;
-use super::simplex::{Direction, Polytope, Reach, Sides, Simplex};
+use super::simplex::{Polytope, Reach, Sides, Simplex};
 use crate::region::REACH;
 
 /// Every side lies this far outside what it bounds, for rounding.
@@ -13,7 +13,7 @@ const PADDING: f64 = 1e-11;
 /// largest probability is split, again and again, and what is left of each half is shrunk to the polytope. Boxes
 /// that lie within the polytope are not split. None where the polytope is empty.
 pub(super) fn partition(polytope: &Polytope, most: usize) -> Vec<Sides> {
-    let mut cutter = Cutter { polytope, simplex: Simplex::new(polytope) };
+    let mut cutter = Cutter::new(polytope);
     let (mut heap, mut within) = (BinaryHeap::new(), Vec::new());
     let mut keep = |heap: &mut BinaryHeap<Node>, node: Node| {
         if node.rows.is_empty() {
@@ -48,7 +48,7 @@ struct Node {
     masses: Vec<f64>,
     /// The rows of the polytope that cut the box.
     rows: Vec<u32>,
-    /// How the reach along each direction was found: 2k of them, the axes' down and up.
+    /// How the reach along each direction was found.
     ends: Vec<End>,
 }
 
@@ -95,29 +95,65 @@ impl Ord for Node {
 struct Cutter<'a> {
     polytope: &'a Polytope,
     simplex: Simplex<'a>,
+    /// The two ways along each axis, down and up.
+    directions: Vec<Vec<f64>>,
 }
 
-impl Cutter<'_> {
+impl<'a> Cutter<'a> {
+    fn new(polytope: &'a Polytope) -> Cutter<'a> {
+        let k = polytope.dimensions;
+        let direction = |axis, sign| (0..k).map(|i| if i == axis { sign } else { 0.0 }).collect();
+        let directions = (0..k).flat_map(|axis| [-1.0, 1.0].map(|sign| direction(axis, sign))).collect();
+        Cutter { polytope, simplex: Simplex::new(polytope), directions }
+    }
+
     /// The box around the polytope.
     fn root(&mut self) -> Option<Node> {
         let k = self.polytope.dimensions;
         let sides = Sides { low: vec![-REACH; k], high: vec![REACH; k] };
-        let ends = directions(k).map(|d| End { basis: self.simplex.corner(d), point: None }).collect();
+        let rows = self.walls(&sides);
+        let ends =
+            self.directions.iter().map(|d| End { basis: self.simplex.corner(d), point: None }).collect();
         let masses = vec![normal_mass(-REACH, REACH); k];
-        let rows = (0..self.polytope.rooms.len() as u32).collect();
         let mut root = self.tightened(Node { sides, masses, rows, ends })?;
         self.drop_rows(&mut root);
         Some(root)
     }
 
+    /// The rows that cut something off the box that no other row does. Most bounds of most bands do not.
+    fn walls(&mut self, sides: &Sides) -> Vec<u32> {
+        let mut walls: Vec<u32> = (0..self.polytope.rooms.len() as u32).collect();
+        for row in 0..self.polytope.rooms.len() {
+            let others: Vec<u32> = walls.iter().copied().filter(|&wall| wall != row as u32).collect();
+            let normal = self.polytope.normal(row);
+            let reach = self.simplex.reach(&others, sides, normal, &mut self.simplex.corner(normal));
+            if let Reach::Attained(bound) | Reach::Bounded(bound) = reach
+                && bound < self.polytope.rooms[row]
+            {
+                walls = others;
+            }
+        }
+        walls
+    }
+
     /// What is left of the halves of a box that is halved across the axis where least is left.
     fn split(&mut self, node: &Node) -> Vec<Node> {
-        let splits = (0..self.polytope.dimensions).map(|axis| {
-            let halves = [false, true].map(|upper| self.half(node, axis, upper));
-            halves.into_iter().flatten().collect::<Vec<_>>()
-        });
-        let mass = |nodes: &[Node]| nodes.iter().map(Node::mass).sum::<f64>();
-        splits.min_by(|a, b| mass(a).total_cmp(&mass(b))).expect("there are axes")
+        let mut best = (f64::INFINITY, Vec::new());
+        for axis in 0..self.polytope.dimensions {
+            let (mut mass, mut halves) = (0.0, Vec::new());
+            for upper in [false, true] {
+                // The second half is not needed to see that the first is too much.
+                if mass < best.0 {
+                    let half = self.half(node, axis, upper);
+                    mass += half.as_ref().map_or(0.0, Node::mass);
+                    halves.extend(half);
+                }
+            }
+            if mass < best.0 {
+                best = (mass, halves);
+            }
+        }
+        best.1
     }
 
     fn half(&mut self, node: &Node, axis: usize, upper: bool) -> Option<Node> {
@@ -131,16 +167,16 @@ impl Cutter<'_> {
     /// The node with each of its sides moved in as far as the polytope lets it. A farthest point that is still in the
     /// box is still the farthest. `None` where nothing is left.
     fn tightened(&mut self, mut node: Node) -> Option<Node> {
-        for (direction, end) in directions(self.polytope.dimensions).zip(&mut node.ends) {
+        for (i, end) in node.ends.iter_mut().enumerate() {
             if end.point.as_ref().is_some_and(|point| node.sides.contains(point)) {
                 continue;
             }
-            let reach = self.simplex.reach(&node.rows, &node.sides, direction, &mut end.basis);
+            let reach = self.simplex.reach(&node.rows, &node.sides, &self.directions[i], &mut end.basis);
             let (Reach::Attained(bound) | Reach::Bounded(bound)) = reach else { return None };
-            let axis = direction.axis;
-            match direction.up {
-                true => node.sides.high[axis] = node.sides.high[axis].min(bound + PADDING),
-                false => node.sides.low[axis] = node.sides.low[axis].max(-bound - PADDING),
+            let axis = i / 2;
+            match i % 2 {
+                0 => node.sides.low[axis] = node.sides.low[axis].max(-bound - PADDING),
+                _ => node.sides.high[axis] = node.sides.high[axis].min(bound + PADDING),
             }
             end.point = matches!(reach, Reach::Attained(_)).then(|| self.simplex.point().to_vec());
         }
@@ -159,8 +195,4 @@ impl Cutter<'_> {
         });
         node.rows = rows;
     }
-}
-
-fn directions(dimensions: usize) -> impl Iterator<Item = Direction> {
-    (0..dimensions).flat_map(|axis| [false, true].map(|up| Direction { axis, up }))
 }

@@ -1,4 +1,4 @@
-//! How far a polytope reaches along an axis within a box: small linear programs by the tens of thousands.
+//! How far a polytope reaches within a box: small linear programs by the tens of thousands.
 //!
 //! A cover asks for the sides of boxes each of which differs from the one before in one or two bounds. That keeps a
 //! basis dual feasible, so a dual simplex method goes on from it, and needs two or three steps of less than a
@@ -63,17 +63,10 @@ impl Sides {
     }
 }
 
-/// One of the two ways along an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Direction {
-    pub(super) axis: usize,
-    pub(super) up: bool,
-}
-
 /// Where a program ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Reach {
-    /// The farthest point is found: how far it is along the direction.
+    /// The farthest point is found: the objective there.
     Attained(f64),
     /// Nothing is farther than this.
     Bounded(f64),
@@ -85,7 +78,7 @@ pub(super) enum Reach {
 /// side and its high side.
 pub(super) struct Simplex<'a> {
     polytope: &'a Polytope,
-    direction: Direction,
+    objective: Vec<f64>,
     /// The inverse of the basis. Its constraints are b . y <= h, and b of one with a row of this is 1 for its own row
     /// and 0 for the others.
     inverse: Vec<f64>,
@@ -101,15 +94,13 @@ pub(super) struct Simplex<'a> {
 impl<'a> Simplex<'a> {
     pub(super) fn new(polytope: &'a Polytope) -> Simplex<'a> {
         let k = polytope.dimensions;
-        let [point, multipliers, normal, column] = [(); 4].map(|()| vec![0.0; k]);
-        let direction = Direction { axis: 0, up: true };
-        Simplex { polytope, direction, inverse: vec![0.0; k * k], point, multipliers, normal, column }
+        let [objective, point, multipliers, normal, column] = [(); 5].map(|()| vec![0.0; k]);
+        Simplex { polytope, objective, inverse: vec![0.0; k * k], point, multipliers, normal, column }
     }
 
-    /// The basis of the corner of a box that is farthest along a direction: dual feasible, whatever the polytope.
-    pub(super) fn corner(&self, direction: Direction) -> Vec<u32> {
-        let is_high = |axis| axis != direction.axis || direction.up;
-        (0..self.polytope.dimensions).map(|axis| self.side(axis, is_high(axis))).collect()
+    /// The basis of the corner of a box that is farthest along an objective: dual feasible, whatever the polytope.
+    pub(super) fn corner(&self, objective: &[f64]) -> Vec<u32> {
+        objective.iter().enumerate().map(|(axis, &c)| self.side(axis, c >= 0.0)).collect()
     }
 
     /// The point where the last program ended.
@@ -117,18 +108,18 @@ impl<'a> Simplex<'a> {
         &self.point
     }
 
-    /// How far the polytope reaches along a direction within a box. Starts from a dual feasible basis, and leaves the
+    /// How far the polytope reaches along an objective, a vector, within a box. Starts from a dual feasible basis, and leaves the
     /// last one in its place. Rows that are not in `rows` must not cut the box.
     pub(super) fn reach(
         &mut self,
         rows: &[u32],
         sides: &Sides,
-        direction: Direction,
+        objective: &[f64],
         basis: &mut [u32],
     ) -> Reach {
-        self.direction = direction;
+        self.objective.copy_from_slice(objective);
         if !self.invert(basis) {
-            basis.copy_from_slice(&self.corner(direction));
+            basis.copy_from_slice(&self.corner(objective));
             self.invert(basis);
         }
         self.locate(sides, basis);
@@ -239,13 +230,12 @@ impl<'a> Simplex<'a> {
     /// Finds the point and the multipliers of a basis.
     fn locate(&mut self, sides: &Sides, basis: &[u32]) {
         let k = self.polytope.dimensions;
-        let sign = if self.direction.up { 1.0 } else { -1.0 };
         self.point.fill(0.0);
         for (i, &constraint) in basis.iter().enumerate() {
             let room = self.room(constraint, sides);
             let row = &self.inverse[i * k..(i + 1) * k];
             self.point.iter_mut().zip(row).for_each(|(y, r)| *y += room * r);
-            self.multipliers[i] = sign * row[self.direction.axis];
+            self.multipliers[i] = dot(&self.objective, row);
         }
     }
 
@@ -293,8 +283,7 @@ impl<'a> Simplex<'a> {
     /// What no point of the box and the polytope exceeds, by the multipliers.
     fn bound(&mut self, sides: &Sides, basis: &[u32]) -> f64 {
         let mut bound = 0.0;
-        self.normal.fill(0.0);
-        self.normal[self.direction.axis] = if self.direction.up { 1.0 } else { -1.0 };
+        self.normal.copy_from_slice(&self.objective);
         for (i, &constraint) in basis.iter().enumerate() {
             if self.multipliers[i] > 0.0 {
                 bound += self.multipliers[i] * self.room(constraint, sides);

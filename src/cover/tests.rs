@@ -21,6 +21,11 @@ fn cover(program: &Program) -> Cover {
     Cover::new(&half_spaces, &centre).unwrap()
 }
 
+/// The cover of reflectances that are scaled to a luminous reflectance of 0.99.
+pub(crate) fn near_white() -> Cover {
+    cover(&program(Some(0.99), 1.0))
+}
+
 #[test]
 fn figures() {
     for (lrv, scale) in [
