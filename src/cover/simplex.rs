@@ -5,7 +5,7 @@
 //! microsecond; a solver that starts over, with constraints in sparse form, takes a hundred times as long (microlp can
 //! add constraints to a solution, but not move a bound of one). Whatever the method does, its answer is sound: any
 //! non-negative multipliers bound the maximum from above (weak duality), and what they leave of the objective is bounded
-//! over the box. A limit on the steps, or rounding, makes a bound loose and never wrong.
+//! over the box. A limit on the steps, a perturbed objective, or rounding makes a bound loose and never wrong.
 
 /// Violations up to this are rounding.
 const FEASIBLE: f64 = 1e-12;
@@ -15,6 +15,10 @@ const EMPTY: f64 = 1e-9;
 
 /// The least element that a basis is changed on.
 const PIVOT: f64 = 1e-12;
+
+/// How much is added to each element of an objective, and a fraction more. Along an axis all multipliers but one would
+/// be 0, and steps that gain nothing would go round in circles.
+const PERTURBATION: f64 = 1e-9;
 
 /// The most steps of a program: many times what any has been seen to take, so only cycles end here.
 const STEPS: usize = 200;
@@ -78,6 +82,7 @@ pub(super) enum Reach {
 /// side and its high side.
 pub(super) struct Simplex<'a> {
     polytope: &'a Polytope,
+    /// Perturbed.
     objective: Vec<f64>,
     /// The inverse of the basis. Its constraints are b . y <= h, and b of one with a row of this is 1 for its own row
     /// and 0 for the others.
@@ -117,7 +122,10 @@ impl<'a> Simplex<'a> {
         objective: &[f64],
         basis: &mut [u32],
     ) -> Reach {
-        self.objective.copy_from_slice(objective);
+        for (i, (perturbed, &c)) in self.objective.iter_mut().zip(objective).enumerate() {
+            let fraction = (i as f64 * 0.618).fract();
+            *perturbed = c + (PERTURBATION * (1.0 + fraction)).copysign(if c >= 0.0 { 1.0 } else { -1.0 });
+        }
         if !self.invert(basis) {
             basis.copy_from_slice(&self.corner(objective));
             self.invert(basis);
@@ -126,7 +134,7 @@ impl<'a> Simplex<'a> {
         for _ in 0..STEPS {
             let (entering, violation) = self.most_violated(rows, sides);
             if violation <= FEASIBLE {
-                return Reach::Attained(self.bound(sides, basis));
+                return Reach::Attained(self.bound(sides, basis, objective));
             }
             self.normal.fill(0.0);
             self.add_normal(entering, 1.0);
@@ -140,7 +148,7 @@ impl<'a> Simplex<'a> {
                 None => break,
             }
         }
-        Reach::Bounded(self.bound(sides, basis))
+        Reach::Bounded(self.bound(sides, basis, objective))
     }
 
     /// The number of a side of the box.
@@ -271,7 +279,7 @@ impl<'a> Simplex<'a> {
     /// below 0, by more than rounding, the one with the largest element (Harris's test). `None` where the entering
     /// constraint contradicts the basis.
     fn leaving(&mut self) -> Option<usize> {
-        const ROUNDING: f64 = 1e-11;
+        const ROUNDING: f64 = 1e-13;
         self.express();
         let ratios = || self.column.iter().zip(&self.multipliers).filter(|&(&c, _)| c > PIVOT);
         let least = ratios().map(|(c, m)| (m.max(0.0) + ROUNDING) / c).fold(f64::INFINITY, f64::min);
@@ -280,17 +288,19 @@ impl<'a> Simplex<'a> {
         candidates.max_by(|&i, &j| self.column[i].total_cmp(&self.column[j]))
     }
 
-    /// What no point of the box and the polytope exceeds, by the multipliers.
-    fn bound(&mut self, sides: &Sides, basis: &[u32]) -> f64 {
+    /// What the objective, unperturbed, exceeds at no point of the box and the polytope.
+    fn bound(&mut self, sides: &Sides, basis: &[u32], objective: &[f64]) -> f64 {
+        let k = self.polytope.dimensions;
         let mut bound = 0.0;
-        self.normal.copy_from_slice(&self.objective);
+        self.normal.copy_from_slice(objective);
         for (i, &constraint) in basis.iter().enumerate() {
-            if self.multipliers[i] > 0.0 {
-                bound += self.multipliers[i] * self.room(constraint, sides);
-                self.add_normal(constraint, -self.multipliers[i]);
+            let multiplier = dot(objective, &self.inverse[i * k..(i + 1) * k]);
+            if multiplier > 0.0 {
+                bound += multiplier * self.room(constraint, sides);
+                self.add_normal(constraint, -multiplier);
             }
         }
-        // What is left of the objective: rounding, if the basis is sound.
+        // What is left of the objective: rounding, and what the perturbation may have hidden.
         let ends = sides.low.iter().zip(&sides.high);
         bound + self.normal.iter().zip(ends).map(|(c, (low, high))| (c * low).max(c * high)).sum::<f64>()
     }
