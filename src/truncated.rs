@@ -95,7 +95,6 @@ pub(crate) fn exact_truncated(axis: [f64; 4], word: u32) -> [f64; 2] {
     let [start, step, mass, shift] = axis;
     if mass < 0.0 {
         let q = u * -mass;
-        // 1 + mass is what lies beyond the interval, and too small for this sum only where v is not.
         let log = if q < 0.25 { (-q).ln_1p() } else { (1.0 + mass + v * -mass).ln() };
         let y = start + step * log;
         return [y + shift, y * y];
@@ -119,4 +118,77 @@ fn exact_quantile(lower: f64, upper: f64) -> f64 {
         y += error / (1.0 - y * error / 2.0);
     }
     if lower < upper { -y } else { y }
+}
+
+#[cfg(test)]
+mod tests {
+    use statrs::distribution::{ContinuousCDF, Normal};
+
+    use super::*;
+
+    /// Every 4,099th word and both ends of every power of two.
+    fn words() -> impl Iterator<Item = u32> {
+        let ends = (0..32).flat_map(|bit| [1u32 << bit, (1 << bit) - 1, !(1 << bit), !((1 << bit) - 1)]);
+        (0..u32::MAX).step_by(4099).chain(ends)
+    }
+
+    #[test]
+    fn the_quantile_is_good_to_5e_7() {
+        let (mut largest, mut of_oracle) = (0f64, 0f64);
+        for x in words().filter(|&x| x != 0x8000_0000 && x != 0x7FFF_FFFF) {
+            let ([u, v], [lower, upper]) = (tails(x), exact_tails(x));
+            let exact = exact_quantile(lower, upper);
+            let value = quantile(u, v, log_of(u.min(v), u.max(v)));
+            largest = largest.max((f64::from(value) - exact).abs() / exact.abs().max(1.0));
+            if (x >> 12) % 64 == 0 {
+                let reference = Normal::standard().inverse_cdf(lower.min(upper)).copysign(exact);
+                of_oracle = of_oracle.max((exact - reference).abs() / exact.abs().max(1.0));
+            }
+        }
+        println!("quantile: largest error {largest:.2e}, the oracle's beside statrs {of_oracle:.2e}");
+        assert!(largest < 5e-7 && of_oracle < 1e-14, "{largest:e} {of_oracle:e}");
+    }
+
+    #[test]
+    fn the_quantile_reaches_far_into_the_tails() {
+        for (tail, exact) in
+            [(1e-12, 7.034483825301131), (1e-16, 8.222082216130435), (1e-20, 9.262340089798409)]
+        {
+            let value = quantile(1.0, tail as f32, log_of(tail as f32, 1.0));
+            assert!((f64::from(value) / exact - 1.0).abs() < 5e-7, "{tail:e}: {value}");
+            assert!((exact_quantile(1.0 - tail, tail) / exact - 1.0).abs() < 1e-12);
+            assert_eq!(quantile(tail as f32, 1.0, log_of(tail as f32, 1.0)), -value);
+        }
+    }
+
+    /// Shares of an interval of any width; the logarithm's relative error is that of a step along a hat.
+    #[test]
+    fn logarithms_keep_their_digits_near_1() {
+        let mut largest = 0f64;
+        for (x, mass) in words().zip([1.0, 0.999, 0.5, 1e-2, 1e-6, 1e-20].into_iter().cycle()) {
+            let axis = [0.0, 1.0, -mass, 0.0];
+            let [exact, _] = exact_truncated(axis, x);
+            let [value, cost] = truncated(axis.map(|v| v as f32), x);
+            assert!(value < 0.0 && cost >= 0.0);
+            // The end of an interval that is nearly all of the exponential's is off by the rounding of its mass.
+            if mass != 0.999 {
+                largest = largest.max((f64::from(value) / exact - 1.0).abs());
+            }
+        }
+        println!("logarithm: largest relative error {largest:.2e}");
+        assert!(largest < 4e-7, "{largest:e}");
+    }
+
+    #[test]
+    fn tails_are_never_0_and_sum_to_1() {
+        for x in words() {
+            let ([u, v], [exact_u, exact_v]) = (tails(x), exact_tails(x));
+            assert!(u > 0.0 && v > 0.0 && u + v == 1.0, "{x}");
+            for (value, exact) in [(u, exact_u), (v, exact_v)] {
+                assert!((f64::from(value) / exact - 1.0).abs() < 1.2e-7);
+            }
+            let thinned = f64::from(chi_square(x)) / exact_chi_square(x) - 1.0;
+            assert!(thinned.abs() < 5e-7, "{x}: {thinned}");
+        }
+    }
 }

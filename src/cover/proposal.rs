@@ -61,16 +61,20 @@ impl<R: Real> Proposal<R> {
     ) -> [bool; L] {
         let k = self.components;
         let mut words = block(0);
-        let boxes = words[0].map(|word| self.alias.choose(word) as usize);
-        let mut cost = boxes.map(|leaf| self.costs[leaf]);
+        let (mut boxes, mut cost) = ([0; L], [R::ZERO; L]);
+        for l in 0..L {
+            boxes[l] = self.alias.choose(words[0][l]) as usize;
+            cost[l] = self.costs[boxes[l]];
+        }
         for (j, coordinate) in coordinates[..k].iter_mut().enumerate() {
             let word = (j + 1) % 4;
             if word == 0 {
                 words = block((j as u32 + 1) / 4);
             }
-            let axes = boxes.map(|leaf| self.axes[leaf * k + j]);
+            let axes = self.axes_in_lanes(&boxes, j);
             for l in 0..L {
-                let [value, price] = R::truncated(axes[l], words[word][l]);
+                let axis = [axes[0][l], axes[1][l], axes[2][l], axes[3][l]];
+                let [value, price] = R::truncated(axis, words[word][l]);
                 coordinate[l] = value;
                 cost[l] = cost[l] + price;
             }
@@ -79,6 +83,24 @@ impl<R: Real> Proposal<R> {
         if word == 0 {
             words = block((k as u32 + 1) / 4);
         }
-        std::array::from_fn(|l| cost[l] < R::chi_square(words[word][l]))
+        let mut kept = [false; L];
+        for l in 0..L {
+            kept[l] = cost[l] < R::chi_square(words[word][l]);
+        }
+        kept
+    }
+
+    /// The numbers of an axis, number by number. Not inlined: the compiler would make vectors of the four numbers
+    /// rather than of the lanes, in all that follows.
+    #[inline(never)]
+    fn axes_in_lanes<const L: usize>(&self, boxes: &[usize; L], axis: usize) -> [[R; L]; 4] {
+        let mut numbers = [[R::ZERO; L]; 4];
+        for (l, chosen) in boxes.iter().enumerate() {
+            let axis = self.axes[chosen * self.components + axis];
+            for (i, number) in axis.into_iter().enumerate() {
+                numbers[i][l] = number;
+            }
+        }
+        numbers
     }
 }

@@ -42,3 +42,26 @@ fn candidate(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Can
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    use super::super::tests::near_white;
+    use crate::wgsl::{Target, generator};
+
+    #[test]
+    fn the_text_is_valid_without_any_capability() {
+        let proposal = near_white().proposal().rounded::<f32>();
+        let normals = [
+            (6, "struct Normals { z0: f32, z1: f32, z2: f32, z3: f32, z4: f32, z5: f32 }"),
+            (8, "alias Normals = array<f32, 8>;"),
+        ];
+        for (padded, normals) in normals {
+            let text = [normals, &generator(Target::Baseline), &proposal.text(padded, 4)].join("\n");
+            let module = naga::front::wgsl::parse_str(&text).map_err(|e| e.emit_to_string(&text)).unwrap();
+            let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+            validator.validate(&module).map_err(|e| e.emit_to_string(&text)).unwrap();
+        }
+    }
+}
