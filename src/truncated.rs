@@ -1,9 +1,9 @@
-//! A coordinate of a box: a uniform word to a standard normal between two ends, or to the exponential that hugs it from
-//! above. GPU twin: `shaders/truncated.wgsl`.
+//! A coordinate of a box: a uniform word to a standard normal between two ends, or to the exponential that hugs it
+//! from above. GPU twin: `shaders/truncated.wgsl`.
 //!
-//! The inverse of the normal's distribution function serves wide intervals. Its error is absolute, 5e-7, so in a narrow
-//! interval it would leave gaps; there the density is nearly an exponential, which is drawn to a relative error
-//! of 3e-7 and thinned to the normal. An axis is four numbers:
+//! The inverse of the normal's distribution function serves wide intervals. Its error is absolute, 5e-7, so in a
+//! narrow interval it would leave gaps; there the density is nearly an exponential, which is drawn to a relative
+//! error of 3e-7 and thinned to the normal. An axis is four numbers:
 //!
 //! - wide: the probability above the interval, that below it, that of the interval, and -centre. The coordinate is the
 //!   quantile of a share of the interval; it costs nothing.
@@ -11,8 +11,8 @@
 //!   exp(-slope y) that falls from its start. Where the coordinate before centring is y, it costs (y - slope)^2:
 //!   the density over the hat is exp(-cost / 2), and the slope lies within the interval, so the hat touches it.
 //!
-//! A candidate stays if the sum of its costs is below [`Real::chi_square`] of one more word. Coordinates are relative to
-//! a centre that is subtracted in f64 beforehand, so that thin regions far from the mean keep their digits.
+//! A candidate stays if the sum of its costs is below [`Real::chi_square`] of one more word. Coordinates are relative
+//! to a centre that is subtracted in f64 beforehand, so that thin regions far from the mean keep their digits.
 //!
 //! In f32 all of it is + - * / and sqrt; in f64 it is the platform's own functions (see [`crate::normal`]).
 
@@ -23,7 +23,8 @@ use std::f64::consts::{PI, SQRT_2};
 use crate::normal::Real;
 use crate::normal::{log1p_reduced, radius};
 
-/// The two tails of a word: u and 1 - u, u = (x + 1/2) 2^-32. The smaller is exact to the last bit, so neither is ever 0.
+/// The two tails of a word: u and 1 - u, u = (x + 1/2) 2^-32. The smaller is exact to the last bit, so neither is
+/// ever 0.
 #[inline(always)]
 fn tails(x: u32) -> [f32; 2] {
     let upper = x >= 0x8000_0000;
@@ -43,9 +44,9 @@ fn log_of(p: f32, q: f32) -> f32 {
     e * LN_2 + log1p_reduced(t)
 }
 
-/// The normal that has the probability `lower` below it and `upper` above it; `log` is that of the smaller. Two rational
-/// functions with positive coefficients (the form of Wichura's algorithm AS 241), minimax fits with relative errors of
-/// 5e-8 in the centre and 8e-8 in the tails, down to 1e-22.
+/// The normal that has the probability `lower` below it and `upper` above it; `log` is that of the smaller. Two
+/// rational functions with positive coefficients (the form of Wichura's algorithm AS 241), minimax fits with relative
+/// errors of 5e-8 in the centre and 8e-8 in the tails, down to 1e-22.
 #[inline(always)]
 fn quantile(lower: f32, upper: f32, log: f32) -> f32 {
     let x = lower - upper;

@@ -1,8 +1,8 @@
 //! A choice of one of many by one random word, with integer odds, so that every engine makes the same one.
 //!
 //! Walker's alias method, by Vose's construction ("A linear algorithm for generating random numbers with a given
-//! distribution", 1991), on integers: the word's top bits choose a column, and the rest choose between the column and its
-//! alias. A choice is made with exactly `odds` in 2^32.
+//! distribution", 1991), on integers: the word's top bits choose a column, and the rest choose between the column and
+//! its alias. A choice is made with exactly `odds` in 2^32.
 
 /// The alias table of odds that sum to 2^32.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +50,8 @@ impl Alias {
     }
 }
 
-/// Odds that sum to 2^32, in proportion to weights: rounded up, so that nothing is left out, and what rounding adds to
-/// each, as a factor of at least 1. The last number is what a weight of 1 would have got.
+/// Odds that sum to 2^32, in proportion to weights: rounded up, so that nothing is left out, and what rounding adds
+/// to each, as a factor of at least 1. The last number is what a weight of 1 would have got.
 pub(super) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
     const WORDS: f64 = 4_294_967_296.0;
     let total: f64 = weights.iter().sum();

@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// The least share of an exponential hat that the normal may fill; below it an axis is drawn by its quantiles. An axis
-/// as narrow as half a standard deviation fills this much, and there the quantiles' error is 1e-6 of its width.
+/// The least share of an exponential hat that the normal may fill; below it an axis is drawn by its quantiles. An
+/// axis as narrow as half a standard deviation fills this much, and there the quantiles' error is 1e-6 of its width.
 const EFFICIENT: f64 = 0.99;
 
 /// Intervals narrower than this have no digits to lose in the middle of theirs.

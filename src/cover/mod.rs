@@ -1,15 +1,15 @@
 //! Exact draws of regions that hold next to none of the candidates.
 //!
-//! What a rule accepts is a polytope in the standard normals z. Where its probability p is small, plain rejection costs
-//! 1 / p candidates a draw. A cover proposes better ones: disjoint boxes that hold the whole polytope, in coordinates
-//! that suit it ([`Frame`]); one of them chosen by its probability ([`Alias`]), and in it a normal for each axis,
-//! truncated to the box ([`crate::truncated`]). What the rule then accepts is distributed exactly as the accepted
-//! candidates of plain rejection are: both are the standard normal density on the polytope. Only the odds change, to
-//! p / (the probability of the boxes), a tenth or more for any p. Points beyond [`REACH`](crate::region::REACH) are
-//! left out.
+//! What a rule accepts is a polytope in the standard normals z. Where its probability p is small, plain rejection
+//! costs 1 / p candidates a draw. A cover proposes better ones: disjoint boxes that hold the whole polytope, in
+//! coordinates that suit it ([`Frame`]); one of them chosen by its probability ([`Alias`]), and in it a normal for
+//! each axis, truncated to the box ([`crate::truncated`]). What the rule then accepts is distributed exactly as the
+//! accepted candidates of plain rejection are: both are the standard normal density on the polytope. Only the odds
+//! change, to p / (the probability of the boxes), a tenth or more for any p. Points beyond
+//! [`REACH`](crate::region::REACH) are left out.
 //!
-//! The half-spaces are open and the boxes closed, but faces have no probability; what a box loses or gains by rounding
-//! to f32 is 1e-7 of it. A draw's physical test is the same as without a cover, on the same f32 spectrum.
+//! The half-spaces are open and the boxes closed, but faces have no probability; what a box loses or gains by
+//! rounding to f32 is 1e-7 of it. A draw's physical test is the same as without a cover, on the same f32 spectrum.
 
 mod alias;
 mod frame;
@@ -67,8 +67,8 @@ pub(crate) struct Estimate {
 }
 
 impl Cover {
-    /// The cover of what half-spaces accept, from a point within. `None` where it would be empty, or there are more than
-    /// [`COMPONENTS`].
+    /// The cover of what half-spaces accept, from a point within. `None` where it would be empty, or there are more
+    /// than [`COMPONENTS`].
     pub(crate) fn new(half_spaces: &[HalfSpace], within: &[f64]) -> Option<Cover> {
         (within.len() <= COMPONENTS).then(|| Cover::of_boxes(half_spaces, within, BOXES)).flatten()
     }

@@ -104,7 +104,8 @@ fn flips(program: &Program, cover: &Cover, count: u64) -> u64 {
     flipped.count() as u64
 }
 
-/// What f32 judges is the spectrum as it comes out, relative to the centre, so thin regions fare no worse than others.
+/// What f32 judges is the spectrum as it comes out, relative to the centre, so thin regions fare no worse than
+/// others.
 #[test]
 fn single_precision_judges_as_double_does() {
     const CANDIDATES: u64 = 100_000;

@@ -7,8 +7,8 @@ const COVER: &str = include_str!("../../shaders/cover.wgsl");
 
 impl Proposal<f32> {
     /// `candidate(key, index, stream, attempt) -> Candidate`: the coordinates, as `Normals` that are made of as many
-    /// floats as `padded`, and whether thinning keeps them. Reads [`words`](Self::words) from a buffer at `binding`. Needs
-    /// the fragments that make random words and normals.
+    /// floats as `padded`, and whether thinning keeps them. Reads [`words`](Self::words) from a buffer at `binding`.
+    /// Needs the fragments that make random words and normals.
     pub(crate) fn text(&self, padded: usize, binding: u32) -> String {
         let k = self.components;
         let word = |w: usize| format!("w{}.{}", w / 4, ["x", "y", "z", "w"][w % 4]);
