@@ -9,7 +9,7 @@ const EFFICIENT: f64 = 0.99;
 /// Intervals narrower than this have no digits to lose in the middle of theirs.
 const NARROW: f64 = 1e-3;
 
-/// Probability that a standard normal lies in an interval, to a relative error of 1e-12.
+/// Probability that a standard normal lies in an interval, to a relative error of 1e-10.
 pub(super) fn normal_mass(low: f64, high: f64) -> f64 {
     let (middle, width) = ((low + high) / 2.0, high - low);
     if width < NARROW {
