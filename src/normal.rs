@@ -13,6 +13,7 @@ use std::f64::consts::{SQRT_2, TAU};
 use std::ops::{Add, Div, Mul};
 
 use crate::level;
+use crate::truncated;
 
 /// A floating-point type that draws can be computed in: f32, the shader's twin, or f64, its oracle.
 pub trait Real:
@@ -34,6 +35,11 @@ pub trait Real:
     fn uniform(x: u32) -> Self;
     /// 2 to this power, which is between 0 and 126.
     fn exp2(self) -> Self;
+    /// A coordinate of a box, of a uniform word: relative to a centre, and what it costs. The four numbers of an axis
+    /// and the cost are those of `src/truncated.rs`.
+    fn truncated(axis: [Self; 4], word: u32) -> [Self; 2];
+    /// -2 ln u of a uniform word u: a chi-square of two degrees of freedom.
+    fn chi_square(word: u32) -> Self;
 }
 
 impl Real for f32 {
@@ -61,6 +67,16 @@ impl Real for f32 {
     fn exp2(self) -> f32 {
         level::exp2(self)
     }
+
+    #[inline(always)]
+    fn truncated(axis: [f32; 4], word: u32) -> [f32; 2] {
+        truncated::truncated(axis, word)
+    }
+
+    #[inline(always)]
+    fn chi_square(word: u32) -> f32 {
+        truncated::chi_square(word)
+    }
 }
 
 impl Real for f64 {
@@ -85,12 +101,20 @@ impl Real for f64 {
     fn exp2(self) -> f64 {
         f64::exp2(self)
     }
+
+    fn truncated(axis: [f64; 4], word: u32) -> [f64; 2] {
+        truncated::exact_truncated(axis, word)
+    }
+
+    fn chi_square(word: u32) -> f64 {
+        truncated::exact_chi_square(word)
+    }
 }
 
 /// log(1 + t) for t in [sqrt(1/2) - 1, sqrt(2) - 1]. The coefficients are a minimax fit in f64, rounded one by one
 /// with the rest fitted again; relative error of the polynomial 3e-8.
 #[inline(always)]
-fn log1p_reduced(t: f32) -> f32 {
+pub(crate) fn log1p_reduced(t: f32) -> f32 {
     let mut p = 0.087404214;
     p = p * t - 0.14309816;
     p = p * t + 0.14916772;

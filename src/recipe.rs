@@ -6,6 +6,7 @@ use rand::distr::Distribution;
 use rayon::prelude::*;
 
 use crate::colorimetry;
+use crate::cover::{Cover, Estimate};
 use crate::cpu::Kernel;
 use crate::dataset::Kind;
 use crate::grid::Grid;
@@ -14,7 +15,7 @@ use crate::normal::Real;
 use crate::outputs::{Asked, outputs};
 use crate::program::{Affine, Bounds, Level, Program, Tally, Target};
 use crate::quantity::{Element, Format, Layout, Quantity};
-use crate::region;
+use crate::region::{self, Room};
 use crate::stream::Stream;
 use crate::wgsl::{self, TextError};
 
@@ -33,7 +34,22 @@ const TOLERABLE_FAILURE: f64 = 1e-12;
 pub struct Recipe {
     model: Model,
     program: Program,
+    probability: f64,
     acceptance: f64,
+    /// How many boxes candidates are proposed from, and how many bytes their table has; `None` of plain rejection.
+    cover: Option<(usize, usize)>,
+}
+
+/// Where candidates come from. The draws have the same distribution either way, but are not the same draws.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Proposal {
+    /// Whatever is expected to cost less.
+    #[default]
+    Auto,
+    /// The model's Gaussian, as in the appendix: right where a good part of it is acceptable.
+    Plain,
+    /// Boxes that cover what is acceptable, for models of up to 12 components: right where next to nothing is.
+    Cover,
 }
 
 /// A recipe under construction.
@@ -44,6 +60,7 @@ pub struct RecipeBuilder {
     bounds: Bounds,
     covariance_scale: f64,
     intensity: Option<Intensity>,
+    proposal: Proposal,
     max_attempts: u32,
     outputs: Asked,
 }
@@ -118,6 +135,10 @@ pub enum RecipeError {
         nanometres(wavelengths)
     )]
     Empty { wavelengths: Vec<f64> },
+    #[error(
+        "what is acceptable cannot be covered: covers are for models of up to 12 components, and this one has {components}"
+    )]
+    NoCover { components: usize },
     #[error("too few candidates would be accepted: {}", hopeless(*acceptance, *max_attempts))]
     Hopeless { acceptance: f64, max_attempts: u32 },
 }
@@ -141,6 +162,7 @@ impl Recipe {
             bounds: Bounds::default(),
             covariance_scale: 1.0,
             intensity: None,
+            proposal: Proposal::default(),
             max_attempts: DEFAULT_MAX_ATTEMPTS,
             outputs: Asked::default(),
         }
@@ -154,6 +176,22 @@ impl Recipe {
     /// The share of candidates that are accepted, estimated from 65,536 of them.
     pub fn acceptance(&self) -> f64 {
         self.acceptance
+    }
+
+    /// The probability that a spectrum of the model obeys the rule, which is the share that plain rejection accepts;
+    /// estimated from as many candidates.
+    pub fn probability(&self) -> f64 {
+        self.probability
+    }
+
+    /// Where candidates come from; never [`Proposal::Auto`].
+    pub fn proposal(&self) -> Proposal {
+        if self.cover.is_some() { Proposal::Cover } else { Proposal::Plain }
+    }
+
+    /// How many boxes candidates are proposed from, and how many bytes their table has, where there is a cover.
+    pub fn cover(&self) -> Option<(usize, usize)> {
+        self.cover
     }
 
     /// What comes out, and how it lies in memory, in the order of [`Quantity`].
@@ -273,6 +311,11 @@ impl RecipeBuilder {
         RecipeBuilder { covariance_scale, ..self }
     }
 
+    /// Where candidates come from ([`Proposal::Auto`]).
+    pub fn proposal(self, proposal: Proposal) -> Self {
+        RecipeBuilder { proposal, ..self }
+    }
+
     /// How many candidates a draw may take ([`DEFAULT_MAX_ATTEMPTS`]).
     pub fn max_attempts(self, max_attempts: u32) -> Self {
         RecipeBuilder { max_attempts, ..self }
@@ -306,15 +349,47 @@ impl RecipeBuilder {
                 return Err(RecipeError::UnreachableLrv { lrv: target.lrv, largest });
             }
         }
-        if let Some(bands) = region::blocking_bands(&program) {
-            let wavelengths = bands.into_iter().map(|band| self.model.grid().wavelength(band)).collect();
-            return Err(RecipeError::Empty { wavelengths });
+        let half_spaces = region::half_spaces(&program);
+        let within = match region::room(&half_spaces) {
+            Room::None { bands } => {
+                let wavelengths = bands.into_iter().map(|band| self.model.grid().wavelength(band)).collect();
+                return Err(RecipeError::Empty { wavelengths });
+            }
+            Room::Ball { centre, .. } => Some(centre),
+            Room::Unknown => None, // which the pilot run will tell
+        };
+        let plain = match self.proposal {
+            Proposal::Cover => 0.0,
+            Proposal::Auto | Proposal::Plain => pilot(&program),
+        };
+        let cover = match within {
+            Some(within) if self.proposal == Proposal::Cover || self.may_cover(plain) => {
+                Cover::new(&half_spaces, &within)
+            }
+            _ => None,
+        };
+        let estimate = cover.as_ref().map(|cover| cover.estimate(Stream::named(0, "pilot"), PILOT));
+        let covered = cover.zip(estimate).filter(|(_, estimate)| Cover::pays(estimate.acceptance, plain));
+        if self.proposal == Proposal::Cover && covered.is_none() {
+            return Err(RecipeError::NoCover { components: program.components() });
         }
-        let acceptance = pilot(&program);
-        if failure(acceptance, self.max_attempts) > TOLERABLE_FAILURE {
+        let mut recipe =
+            Recipe { model: self.model, program, probability: plain, acceptance: plain, cover: None };
+        if let Some((cover, Estimate { acceptance, probability, .. })) = covered {
+            recipe.program = recipe.program.covered(&cover);
+            recipe.cover = Some((cover.len(), cover.proposal().bytes()));
+            (recipe.probability, recipe.acceptance) = (probability, acceptance);
+        }
+        if failure(recipe.acceptance, self.max_attempts) > TOLERABLE_FAILURE {
+            let acceptance = recipe.acceptance;
             return Err(RecipeError::Hopeless { acceptance, max_attempts: self.max_attempts });
         }
-        Ok(Recipe { model: self.model, program, acceptance })
+        Ok(recipe)
+    }
+
+    /// Whether a cover is to be tried.
+    fn may_cover(&self, plain: f64) -> bool {
+        self.proposal == Proposal::Auto && Cover::could_pay(plain)
     }
 
     fn brighten(&self, program: Program, intensity: Intensity) -> Result<Program, RecipeError> {
@@ -435,15 +510,15 @@ mod tests {
             (surface.clone().covariance_scale(f64::NAN), "finite and not negative"),
             (surface.clone().max_attempts(0), "at least 1 attempt"),
             (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
-            (surface.clone().covariance_scale(1e6), "none of 65536 was"),
-            (surface.clone().covariance_scale(100.0).max_attempts(1000), "allow at least"),
+            (surface.clone().covariance_scale(1e6).proposal(Proposal::Plain), "none of 65536 was"),
+            (surface.clone().covariance_scale(100.0).max_attempts(50), "allow at least"),
             (light.clone().lrv(0.5), "of illuminants"),
         ] {
             let text = message(recipe);
             assert!(text.contains(part), "{text}");
         }
         // What the message advises is enough.
-        let advised = message(surface.clone().covariance_scale(100.0).max_attempts(1000));
+        let advised = message(surface.clone().covariance_scale(100.0).max_attempts(50));
         let attempts =
             advised.split("allow at least ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!(surface.covariance_scale(100.0).max_attempts(attempts).build().is_ok());

@@ -2,7 +2,8 @@
 
 use clap::ValueEnum;
 use spectroll::{
-    Bounds, DEFAULT_MAX_ATTEMPTS, Intensity, Luminance, Model, Quantity, Recipe, RecipeBuilder, colorimetry,
+    Bounds, DEFAULT_MAX_ATTEMPTS, Intensity, Luminance, Model, Proposal, Quantity, Recipe, RecipeBuilder,
+    colorimetry,
 };
 
 use super::Usage;
@@ -30,6 +31,9 @@ pub(super) struct RecipeArguments {
     /// Give illuminants' XYZ and sRGB with Y = 1
     #[arg(long)]
     unit_luminance: bool,
+    /// Where candidates come from
+    #[arg(long, value_enum, default_value = "auto")]
+    proposal: ProposalName,
     /// How many candidates a draw may take
     #[arg(long, default_value_t = DEFAULT_MAX_ATTEMPTS, value_name = "N")]
     max_attempts: u32,
@@ -43,6 +47,16 @@ enum BoundsName {
     Scaled,
     /// Both
     Both,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ProposalName {
+    /// Whatever is expected to cost less
+    Auto,
+    /// The model's Gaussian
+    Plain,
+    /// Boxes that cover what is acceptable
+    Cover,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -93,6 +107,11 @@ impl RecipeArguments {
         let mut recipe = Recipe::new(model)
             .covariance_scale(self.cov_scale)
             .max_attempts(self.max_attempts)
+            .proposal(match self.proposal {
+                ProposalName::Auto => Proposal::Auto,
+                ProposalName::Plain => Proposal::Plain,
+                ProposalName::Cover => Proposal::Cover,
+            })
             .quantities(self.quantities.iter().map(|q| q.quantity()));
         if let Some(lrv) = self.lrv {
             recipe = recipe.lrv(lrv).bounds(match self.bounds {
