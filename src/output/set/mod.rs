@@ -32,8 +32,9 @@ pub use seal::{Outcome, merge};
 /// About how many bytes a chunk has unless asked otherwise: large enough for a disk, small enough to hold several.
 const CHUNK_BYTES: u64 = 16 << 20;
 
-/// How often the manifest is brought up to date, at most: what a killed run does again.
-const CHECKPOINT: Duration = Duration::from_secs(1);
+/// How often the manifest is brought up to date, at most: what a killed run does again. Never so often that it takes
+/// more than a twentieth of the time.
+const CHECKPOINT: Duration = Duration::from_millis(100);
 
 /// How chunks are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -140,8 +141,9 @@ pub struct SetWriter {
     filling: Vec<Vec<u8>>,
     pool: Pool,
     spare: Vec<Vec<Vec<u8>>>,
+    /// When the manifest may be brought up to date again.
     checkpoint: Instant,
-    /// Chunks since then.
+    /// Chunks that it does not have.
     unsaved: usize,
 }
 
@@ -261,14 +263,16 @@ impl SetWriter {
             done.chunk.columns.iter_mut().for_each(Vec::clear);
             self.spare.push(done.chunk.columns);
         }
-        if self.unsaved > 0 && self.checkpoint.elapsed() > CHECKPOINT { self.save() } else { Ok(()) }
+        if self.unsaved > 0 && Instant::now() > self.checkpoint { self.save() } else { Ok(()) }
     }
 
     /// Brings this process's manifest up to date.
     fn save(&mut self) -> Result<(), OutputError> {
         let name = part_name(self.shard.index, self.shard.count);
+        let start = Instant::now();
         self.manifest.place(&self.root, &self.root.join(name)).map_err(|source| self.failed(source))?;
-        (self.checkpoint, self.unsaved) = (Instant::now(), 0);
+        self.checkpoint = Instant::now() + CHECKPOINT.max(20 * start.elapsed());
+        self.unsaved = 0;
         Ok(())
     }
 
