@@ -135,7 +135,10 @@ fn spd_folders_are_named_as_the_authors_named_theirs() {
     let folder = folder.path();
     succeeds(folder, "sample munsell-vrhel -n 3 --seed 3 --engine cpu -o a.npy");
     succeeds(folder, "sample munsell-vrhel -n 3 --seed 3 --engine cpu --format spd -o b/");
-    assert_eq!(files(&folder.join("b")), ["reflectance_001.spd", "reflectance_002.spd", "reflectance_003.spd"]);
+    assert_eq!(
+        files(&folder.join("b")),
+        ["reflectance_001.spd", "reflectance_002.spd", "reflectance_003.spd"]
+    );
     let (_, values) = npy(&folder.join("a.npy"));
     let text = fs::read_to_string(folder.join("b/reflectance_002.spd")).unwrap();
     assert!(text.starts_with("400 0.") && text.ends_with('\n'));
@@ -161,7 +164,7 @@ fn spd_files_load_in_mitsuba() {
     succeeds(folder.path(), "sample munsell-vrhel -n 1 --format spd -o b/");
     let code = "import mitsuba as mi\n\
                 mi.set_variant('scalar_spectral')\n\
-                s = mi.load_dict({'type': 'regular' if False else 'spectrum', 'filename': 'b/reflectance_001.spd'})\n\
+                s = mi.load_dict({'type': 'spectrum', 'filename': 'b/reflectance_001.spd'})\n\
                 line = open('b/reflectance_001.spd').read().split()\n\
                 si = mi.SurfaceInteraction3f(); si.wavelengths = [400, 410, 550, 700]\n\
                 got = s.eval(si)\n\
@@ -187,7 +190,12 @@ fn fits_read_what_samples_write() {
         assert_eq!(explains(file), expected, "{file}");
     }
     fails(folder, "fit a.npy --kind reflectance -o x.json", 4, "pass --wavelengths");
-    fails(folder, "fit a.npy --kind reflectance --wavelengths 400:5:700 -o x.json", 4, "31 bands do not lie on the 61");
+    fails(
+        folder,
+        "fit a.npy --kind reflectance --wavelengths 400:5:700 -o x.json",
+        4,
+        "31 bands do not lie on the 61",
+    );
     // What MATLAB itself writes is compressed, and of doubles.
     python(
         folder,

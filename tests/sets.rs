@@ -51,7 +51,9 @@ fn killed_runs_go_on_to_the_same_bytes() {
             if ends_within(start(killed.path(), &format!("{run} --resume")), time.mul_f64(share)) {
                 completions += 1;
                 assert!(tree(killed.path()) == expected, "{layout} after {kills} kills");
-                fs::remove_dir_all(killed.path().join("a.zarr")).or(fs::remove_dir_all(killed.path().join("a"))).unwrap();
+                fs::remove_dir_all(killed.path().join("a.zarr"))
+                    .or(fs::remove_dir_all(killed.path().join("a")))
+                    .unwrap();
             } else {
                 kills += 1;
                 assert!(files(killed.path()).iter().all(|name| name.ends_with(".partial")), "{layout}");
@@ -101,7 +103,10 @@ fn shards_at_once_make_the_bytes_of_one_process() {
     // One after another, the last one's index from Kubernetes; and by hand what the last would have done itself.
     let folder = tempfile::tempdir().unwrap();
     let (_, err) = succeeds(folder.path(), &format!("{run} --shard 1/2"));
-    assert!(err.contains("34 of 67 chunks are finished") || err.contains("33 of 67 chunks are finished"), "{err}");
+    assert!(
+        err.contains("34 of 67 chunks are finished") || err.contains("33 of 67 chunks are finished"),
+        "{err}"
+    );
     fails(folder.path(), "merge a.zarr", 1, "of 67 chunks are done");
     let mut command = Command::new(PROGRAM);
     command.args(format!("{run} --shard auto/2").split_whitespace()).env("JOB_COMPLETION_INDEX", "1");
@@ -114,7 +119,8 @@ fn shards_at_once_make_the_bytes_of_one_process() {
 fn another_data_set_is_not_mixed_in() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let run = |flags: &str| format!("sample munsell-vrhel -n 6000 --chunk 1000 --engine cpu -o a.zarr {flags}");
+    let run =
+        |flags: &str| format!("sample munsell-vrhel -n 6000 --chunk 1000 --engine cpu -o a.zarr {flags}");
     succeeds(folder, &run("--shard 1/2 --seed 1"));
     for (flags, difference) in [
         ("--seed 2", "seed is 1 there and 2 here"),
@@ -144,9 +150,13 @@ fn a_flipped_bit_is_found() {
         succeeds(folder, &format!("sample granada -n 5000 --chunk 700 --engine cpu -o {layout}"));
         let set = files(folder).pop().unwrap();
         let (_, err) = succeeds(folder, &format!("verify {set} --redraw 1"));
-        assert!(err.contains("8 of 8 chunks are as they were written") && err.contains("8 of them drawn again"), "{err}");
+        assert!(
+            err.contains("8 of 8 chunks are as they were written") && err.contains("8 of them drawn again"),
+            "{err}"
+        );
         let all = tree(&folder.join(&set));
-        let (name, bytes) = all.iter().find(|(name, _)| name.contains("c.3") || name.contains("-000003")).unwrap();
+        let (name, bytes) =
+            all.iter().find(|(name, _)| name.contains("c.3") || name.contains("-000003")).unwrap();
         let path = folder.join(&set).join(name);
         let mut flipped = bytes.clone();
         flipped[bytes.len() / 2] ^= 16;
@@ -156,7 +166,12 @@ fn a_flipped_bit_is_found() {
         fails(folder, &format!("verify {set}"), 5, "bytes instead of");
         fs::remove_file(&path).unwrap();
         fails(folder, &format!("verify {set}"), 5, "is missing");
-        fails(folder, &format!("sample granada -n 5000 --chunk 700 --engine cpu -o {layout} --resume"), 5, "damaged");
+        fails(
+            folder,
+            &format!("sample granada -n 5000 --chunk 700 --engine cpu -o {layout} --resume"),
+            5,
+            "damaged",
+        );
     }
     // Sums that were made to match are found by drawing again.
     let folder = tempfile::tempdir().unwrap();

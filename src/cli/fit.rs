@@ -69,7 +69,11 @@ enum ExtendName {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let tables = arguments.files.iter().map(|file| table(file, arguments.wavelengths)).collect::<anyhow::Result<Vec<_>>>()?;
+    let tables = arguments
+        .files
+        .iter()
+        .map(|file| table(file, arguments.wavelengths))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let kind = kind(arguments, &tables)?;
     let extend = match arguments.extend {
         ExtendName::Error => Extend::Error,

@@ -201,7 +201,7 @@ impl Sink {
     pub(super) fn missing(&self, count: u64) -> Vec<Range<u64>> {
         match self {
             Sink::Set(set) => set.missing(),
-            _ => vec![0..count],
+            _ => std::iter::once(0..count).collect(),
         }
     }
 

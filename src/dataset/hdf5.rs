@@ -17,9 +17,9 @@ pub(super) fn matrices(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
     let mut left = MAX_BYTES as usize / size_of::<f64>();
     for name in file.dataset_names() {
         let set = file.dataset(&name).map_err(failed)?;
-        let (columns, rows) = match set.shape().as_slice() {
-            &[length] => (1, length),
-            &[columns, rows] => (columns, rows),
+        let (columns, rows) = match *set.shape() {
+            [length] => (1, length),
+            [columns, rows] => (columns, rows),
             _ => continue,
         };
         let Some(count) = columns.checked_mul(rows).filter(|count| *count <= left) else {

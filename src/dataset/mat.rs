@@ -89,7 +89,9 @@ fn sampling(matrix: &Matrix) -> Option<(String, Grid)> {
 fn wavelengths(matrix: &Matrix) -> Option<(String, Grid)> {
     let is_named = matches!(matrix.name.to_ascii_lowercase().as_str(), "wavelength" | "wavelengths" | "wave");
     let is_vector = matrix.rows == 1 || matrix.columns == 1;
-    (is_named && is_vector).then(|| Grid::from_wavelengths(&matrix.values).ok())?.map(|grid| (String::new(), grid))
+    (is_named && is_vector)
+        .then(|| Grid::from_wavelengths(&matrix.values).ok())?
+        .map(|grid| (String::new(), grid))
 }
 
 /// The sampling that belongs to a matrix: the one whose suffix ends the matrix's name, else the only one in the file;
@@ -159,7 +161,8 @@ fn hdf5(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
 
 #[cfg(not(feature = "hdf5"))]
 fn hdf5(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
-    let reason = "this build leaves out HDF5: build it with --features hdf5, or resave with save(file, '-v7')";
+    let reason =
+        "this build leaves out HDF5: build it with --features hdf5, or resave with save(file, '-v7')";
     Err(DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() })
 }
 

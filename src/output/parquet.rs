@@ -38,11 +38,11 @@ pub(super) struct Parquet<W: Write + Send> {
 impl<W: Write + Send> Parquet<W> {
     pub(super) fn begin(to: W, schema: &Schema) -> io::Result<Self> {
         let wavelengths = serde_json::to_string(&schema.wavelengths).expect("numbers are JSON");
-        let metadata = vec![
-            KeyValue::new("ARROW:schema".to_owned(), arrow_schema(&schema.fields)),
-            KeyValue::new("wavelengths".to_owned(), wavelengths),
-            KeyValue::new("spectroll".to_owned(), schema.attributes_text()),
-        ];
+        let notes = [("wavelengths", wavelengths), ("spectroll", schema.attributes_text())];
+        let arrow = arrow_schema(&schema.fields, &notes);
+        // Readers that know Arrow look for notes in its schema, others beside it.
+        let metadata = notes.into_iter().chain([("ARROW:schema", arrow)]);
+        let metadata = metadata.map(|(key, value)| KeyValue::new(key.to_owned(), value)).collect();
         let properties = WriterProperties::builder()
             .set_dictionary_enabled(false)
             .set_statistics_enabled(EnabledStatistics::None)
@@ -180,14 +180,26 @@ const fn entry(slot: u16) -> u16 {
 }
 
 /// The fields as Arrow's readers know them: an encapsulated message, in Base64.
-fn arrow_schema(fields: &[Field]) -> String {
+fn arrow_schema(fields: &[Field], notes: &[(&str, String)]) -> String {
     const VERSION_5: i16 = 4;
     const SCHEMA: u8 = 1;
     let mut to = FlatBufferBuilder::new();
     let fields: Vec<_> = fields.iter().map(|field| arrow_field(&mut to, field)).collect();
     let fields = to.create_vector(&fields);
+    let notes: Vec<Table> = notes
+        .iter()
+        .map(|(key, value)| {
+            let (key, value) = (to.create_string(key), to.create_string(value));
+            let note = to.start_table();
+            to.push_slot_always(entry(0), key);
+            to.push_slot_always(entry(1), value);
+            to.end_table(note)
+        })
+        .collect();
+    let notes = to.create_vector(&notes);
     let schema = to.start_table();
     to.push_slot_always(entry(1), fields);
+    to.push_slot_always(entry(2), notes);
     let schema = to.end_table(schema);
     let message = to.start_table();
     to.push_slot_always(entry(0), VERSION_5);

@@ -48,7 +48,9 @@ pub(crate) fn tree(folder: &Path) -> Vec<(String, Vec<u8>)> {
     for name in files(folder) {
         let path = folder.join(&name);
         match path.is_dir() {
-            true => all.extend(tree(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes))),
+            true => {
+                all.extend(tree(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)))
+            }
             false => all.push((name, fs::read(path).unwrap())),
         }
     }
