@@ -180,3 +180,55 @@ fn adapters_and_bench_speak_both_languages() {
     let (json, _) = succeeds(folder.path(), "bench granada --engine cpu --runs 5 --json");
     assert!(serde_json::from_str::<serde_json::Value>(&json).unwrap()[0]["median"].as_f64().unwrap() > 0.0);
 }
+
+#[test]
+fn a_file_may_hold_the_flags() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name| folder.path().join(name);
+    let config = "model = \"munsell-vrhel\"\ncount = 100\nseed = 4\nlrv = 0.4\nengine = \"cpu\"\nquiet = true\nforce = false";
+    fs::write(path("c.toml"), config).unwrap();
+    let plain = "sample munsell-vrhel -n 100 --lrv 0.4 --engine cpu";
+    for (arguments, same) in [
+        ("sample --config c.toml -o a.npy", format!("{plain} --seed 4 -o b.npy")),
+        ("sample --config c.toml --seed 9 -o a.npy", format!("{plain} --seed 9 -o b.npy")),
+        (
+            "sample --config c.toml granada-5nm -n 7 --lrv 0.2 -o a.npy",
+            "sample granada -n 1 -o b.npy".to_owned(),
+        ),
+    ] {
+        if arguments.contains("granada") {
+            // The flags win: here they ask for what cannot be.
+            fails(folder.path(), arguments, 2, "this model is of illuminants");
+            continue;
+        }
+        let (_, err) = succeeds(folder.path(), arguments);
+        assert_eq!(err, "");
+        succeeds(folder.path(), &same);
+        assert_eq!(fs::read(path("a.npy")).unwrap(), fs::read(path("b.npy")).unwrap(), "{arguments}");
+        fs::remove_file(path("a.npy")).unwrap();
+        fs::remove_file(path("b.npy")).unwrap();
+    }
+    // One way to name what draws wins over the other.
+    fails(folder.path(), "sample --config c.toml --adapter nonesuch -o a.npy", 3, "no adapter");
+    for (config, message) in [
+        ("sed = 4", "`spectroll sample` has no flag \"sed\""),
+        ("seed = [", "cannot use the configuration"),
+        ("quiet = 3", "quiet: expected true or false"),
+        ("seed = 2020-01-01", "cannot be a flag"),
+    ] {
+        fs::write(path("c.toml"), config).unwrap();
+        fails(folder.path(), "sample granada -n 1 --config c.toml -o a.npy", 2, message);
+    }
+    fails(folder.path(), "sample granada -n 1 --config d.toml -o a.npy", 2, "cannot use the configuration");
+}
+
+#[test]
+fn packagers_get_completions_and_pages() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(succeeds(folder.path(), &format!("completions {shell}")).0.contains("spectroll"), "{shell}");
+    }
+    assert!(succeeds(folder.path(), "man").0.contains(".TH spectroll 1"));
+    succeeds(folder.path(), "man pages");
+    assert!(files(&folder.path().join("pages")).contains(&"spectroll-sample.1".to_owned()));
+}

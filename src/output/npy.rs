@@ -33,7 +33,8 @@ impl<W: Write> Encoder for Npy<W> {
 
 /// A whole small file.
 pub(super) fn file(dtype: &str, shape: &[u64], data: &[u8]) -> io::Result<Vec<u8>> {
-    Ok([header(dtype, shape)?, data.to_vec()].concat())
+    let header = header(dtype, shape)?;
+    Ok([&header, data].concat())
 }
 
 /// What comes before the data of an array.

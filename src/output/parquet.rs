@@ -100,43 +100,41 @@ impl<W: Write + Send> Encoder for Parquet<W> {
     }
 }
 
+/// How many draws go through the crate's hands at once: their levels take as much memory as they do.
+const BATCH_ROWS: usize = 4096;
+
 fn write_column(
     writer: &mut SerializedColumnWriter,
     field: &Field,
     bytes: &[u8],
 ) -> Result<(), ParquetError> {
-    fn write<T: DataType>(
-        writer: &mut SerializedColumnWriter,
-        field: &Field,
-        values: Vec<T::T>,
-    ) -> Result<(), ParquetError> {
-        let levels = field.axis.as_ref().map(|_| {
-            let defined = vec![1; values.len()];
-            let continues = (0..values.len()).map(|i| i16::from(i % field.width != 0)).collect::<Vec<_>>();
-            (defined, continues)
-        });
-        let (defined, continues) = match &levels {
-            Some((defined, continues)) => (Some(defined.as_slice()), Some(continues.as_slice())),
+    match field.stored {
+        Element::F32 => write_values::<FloatType, 4>(writer, field, bytes, f32::from_le_bytes),
+        Element::F64 => write_values::<DoubleType, 8>(writer, field, bytes, f64::from_le_bytes),
+        Element::U32 => write_values::<Int32Type, 4>(writer, field, bytes, i32::from_le_bytes),
+        Element::F16 => unreachable!("the format holds no halves: see Format::check"),
+    }
+}
+
+fn write_values<T: DataType, const SIZE: usize>(
+    writer: &mut SerializedColumnWriter,
+    field: &Field,
+    bytes: &[u8],
+    value: fn([u8; SIZE]) -> T::T,
+) -> Result<(), ParquetError> {
+    // Of each value: that it is there, and whether it goes on with the list of the one before.
+    let defined = vec![1; BATCH_ROWS * field.width];
+    let continues: Vec<_> = (0..defined.len()).map(|i| i16::from(i % field.width != 0)).collect();
+    for batch in bytes.chunks(BATCH_ROWS * field.stored_bytes()) {
+        let (values, _) = batch.as_chunks();
+        let values: Vec<T::T> = values.iter().copied().map(value).collect();
+        let (defined, continues) = match field.axis {
+            Some(_) => (Some(&defined[..values.len()]), Some(&continues[..values.len()])),
             None => (None, None),
         };
         writer.typed::<T>().write_batch(&values, defined, continues)?;
-        Ok(())
     }
-    match field.stored {
-        Element::F32 => {
-            let values = bytes.chunks_exact(4).map(|v| f32::from_le_bytes(v.try_into().expect("four")));
-            write::<FloatType>(writer, field, values.collect())
-        }
-        Element::F64 => {
-            let values = bytes.chunks_exact(8).map(|v| f64::from_le_bytes(v.try_into().expect("eight")));
-            write::<DoubleType>(writer, field, values.collect())
-        }
-        Element::U32 => {
-            let values = bytes.chunks_exact(4).map(|v| i32::from_le_bytes(v.try_into().expect("four")));
-            write::<Int32Type>(writer, field, values.collect())
-        }
-        Element::F16 => unreachable!("the format holds no halves: see Format::check"),
-    }
+    Ok(())
 }
 
 /// The schema as Parquet knows it.

@@ -8,7 +8,9 @@ use tempfile::NamedTempFile;
 
 use super::OutputError;
 
-const PREFIX: &str = ".spectroll-";
+/// What the names of temporary files begin with.
+pub(super) const PREFIX: &str = ".spectroll-";
+
 const SUFFIX: &str = ".partial";
 
 /// What to do where something of the name exists.
@@ -41,7 +43,7 @@ impl Pending {
         if existing == Existing::Keep && path.symlink_metadata().is_ok() {
             return Err(OutputError::Exists { path });
         }
-        match temporary(existing_folder(&path)?) {
+        match temporary(existing_folder(&path)?, PREFIX) {
             Ok(file) => Ok(Pending { file, path, existing }),
             Err(source) => Err(OutputError::Write { path, source }),
         }
@@ -85,10 +87,15 @@ pub fn write_file(path: &Path, existing: Existing, bytes: &[u8]) -> Result<(), O
     pending.finish()
 }
 
-/// Puts a whole file in place, by way of a temporary one in `by`: complete whenever it is there, and on disk once
+/// Puts a whole file in place, by way of a temporary one beside it: complete whenever it is there, and on disk once
 /// [`sync_folder`] was called as well.
-pub(super) fn place(by: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = temporary(by)?;
+pub(super) fn place(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    place_by(folder(path), PREFIX, path, bytes)
+}
+
+/// The same, by way of a temporary file in another folder whose name begins with `prefix`.
+pub(super) fn place_by(by: &Path, prefix: &str, path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = temporary(by, prefix)?;
     file.write_all(bytes)?;
     file.as_file().sync_data()?;
     file.persist(path).map_err(|e| e.error)?;
@@ -96,21 +103,21 @@ pub(super) fn place(by: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// A new temporary file of ours.
-fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
+fn temporary(folder: &Path, prefix: &str) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(PREFIX).suffix(SUFFIX);
+    builder.prefix(prefix).suffix(SUFFIX);
     #[cfg(unix)] // as any new file; by default only its owner could read it
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder)
 }
 
-/// Removes the temporary files that killed runs left in a folder.
-pub(super) fn sweep(folder: &Path) -> io::Result<()> {
+/// Removes the temporary files that killed runs left in a folder, as far as their names begin with `prefix`.
+pub(super) fn sweep(folder: &Path, prefix: &str) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if name.starts_with(PREFIX) && name.ends_with(SUFFIX) {
+        if name.starts_with(prefix) && name.ends_with(SUFFIX) {
             // Another process may have been faster.
             fs::remove_file(entry.path()).or_else(ignore_missing)?;
         }
@@ -172,9 +179,9 @@ mod tests {
     #[test]
     fn what_killed_runs_leave_is_swept() {
         let folder = tempfile::tempdir().unwrap();
-        let left = temporary(folder.path()).unwrap().keep().unwrap().1;
+        let left = temporary(folder.path(), PREFIX).unwrap().keep().unwrap().1;
         fs::write(folder.path().join("mine.partial"), "mine").unwrap();
-        sweep(folder.path()).unwrap();
+        sweep(folder.path(), PREFIX).unwrap();
         assert!(!left.exists() && folder.path().join("mine.partial").exists());
     }
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::super::pending::{ignore_missing, place};
+use super::super::pending::ignore_missing;
 use super::super::{OutputError, Schema};
 use super::{Layout, Part};
 
@@ -128,9 +128,9 @@ impl Manifest {
         }
     }
 
-    pub(super) fn place(&self, by: &Path, path: &Path) -> io::Result<()> {
-        let text = serde_json::to_string_pretty(self).expect("manifests are JSON") + "\n";
-        place(by, path, text.as_bytes())
+    /// The text of its file.
+    pub(super) fn text(&self) -> String {
+        serde_json::to_string_pretty(self).expect("manifests are JSON") + "\n"
     }
 
     /// The manifest of a whole set.

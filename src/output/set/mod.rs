@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::pending::existing_folder;
+use super::pending::{existing_folder, place};
 use super::{OutputError, parts, zarr};
 pub use audit::Audit;
 pub use manifest::Plan;
@@ -195,8 +195,7 @@ impl SetWriter {
                 fs::create_dir_all(writer.root.join(folder)).map_err(failed)?;
             }
             for (name, text) in companions {
-                super::pending::place(&writer.root, &writer.root.join(name), text.as_bytes())
-                    .map_err(failed)?;
+                place(&writer.root.join(name), text.as_bytes()).map_err(failed)?;
             }
             writer.save()?;
         }
@@ -270,7 +269,8 @@ impl SetWriter {
     fn save(&mut self) -> Result<(), OutputError> {
         let name = part_name(self.shard.index, self.shard.count);
         let start = Instant::now();
-        self.manifest.place(&self.root, &self.root.join(name)).map_err(|source| self.failed(source))?;
+        place(&self.root.join(name), self.manifest.text().as_bytes())
+            .map_err(|source| self.failed(source))?;
         self.checkpoint = Instant::now() + CHECKPOINT.max(20 * start.elapsed());
         self.unsaved = 0;
         Ok(())

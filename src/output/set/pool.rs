@@ -108,8 +108,7 @@ impl Worker {
         parts
             .iter()
             .map(|part| {
-                let path = self.root.join(&part.name);
-                place(path.parent().expect("a part is in the set's folder"), &path, &part.bytes)?;
+                place(&self.root.join(&part.name), &part.bytes)?;
                 Ok(Sum::of(part))
             })
             .collect()

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::super::OutputError;
-use super::super::pending::{folder, place, sweep, sync_folder};
+use super::super::pending::{PREFIX, folder, place_by, sweep, sync_folder};
 use super::manifest::{Manifest, SEALED, manifests, part_name, remove_parts};
 use super::{Plan, Shard, Start};
 
@@ -104,19 +104,22 @@ fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<Outcome, OutputEr
         let (done, chunks) = (manifest.chunks.len() as u64, manifest.plan.chunks());
         return Ok(Outcome::Waiting { done, chunks });
     }
-    // Temporary files are made outside: one that is inside while another process renames would stay there.
+    // Temporary files are made outside: one that is inside while another process renames would stay there. Theirs is a
+    // name that tells them from those of other files in that folder.
     let by = folder(path);
+    let prefix = format!("{PREFIX}{}.seal-", path.file_name().unwrap_or_default().to_string_lossy());
+    let place = |name: &str, bytes: &[u8]| place_by(by, &prefix, &root.join(name), bytes).map_err(failed);
     let layout = manifest.plan.layout;
     for part in layout.metadata(&manifest.plan).map_err(failed)? {
-        place(by, &root.join(&part.name), &part.bytes).map_err(failed)?;
+        place(&part.name, &part.bytes)?;
     }
-    manifest.place(by, &root.join(SEALED)).map_err(failed)?;
+    place(SEALED, manifest.text().as_bytes())?;
     remove_parts(root).map_err(failed)?;
     for folder in layout.folders(&manifest.plan) {
-        sweep(&root.join(&folder)).map_err(failed)?;
+        sweep(&root.join(&folder), PREFIX).map_err(failed)?;
         sync_folder(&root.join(&folder));
     }
-    sweep(root).map_err(failed)?;
+    sweep(root, PREFIX).map_err(failed)?;
     sync_folder(root);
     match replace && path.exists() {
         true => {
@@ -127,6 +130,7 @@ fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<Outcome, OutputEr
         }
         false => fs::rename(root, path).map_err(failed)?,
     }
+    sweep(by, &prefix).map_err(failed)?;
     sync_folder(by);
     Ok(Outcome::Sealed)
 }
