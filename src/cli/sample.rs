@@ -96,7 +96,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         _ => "",
     };
 
-    watch_interrupts();
     let start = Instant::now();
     let (summary, outcome) = draw(arguments, target, schema, &recipe, draws, &engine)?;
     let seconds = start.elapsed().as_secs_f64();
@@ -142,14 +141,22 @@ fn draw(
     draws: Draws,
     engine: &Engine,
 ) -> anyhow::Result<(Summary, Outcome)> {
+    let is_set = matches!(target, Target::Set(_));
     let mut drawer = engine.drawer(recipe)?;
-    if let Target::Set(_) = target {
+    if is_set {
         let rounding = request::rounding(&mut drawer)?;
         schema.attributes.insert("rounding".to_owned(), rounding.into());
     }
     let spd = (request::spd_name(&arguments.request, recipe.model().kind()), draws.first);
     let model = recipe.model().to_json();
+    // Checking what is there of a set may take minutes and be ended at any moment; a file that is begun may not.
+    if !is_set {
+        watch_interrupts();
+    }
     let mut sink = arguments.output.open(target, &schema, spd, (&model, &request::engine_name(engine)))?;
+    if is_set {
+        watch_interrupts();
+    }
     let missing = sink.missing(draws.count);
     let count = missing.iter().map(|part| part.end - part.start).sum();
     let progress = Progress::new(count, arguments.quiet, arguments.output.to_stdout());
