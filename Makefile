@@ -26,9 +26,9 @@ bench: driver python
 driver:
 	@sh scripts/driver.sh
 
-# NumPy and SciPy, against which fits and files are tested.
+# NumPy, SciPy and the readers of every format, against which fits and files are tested.
 python: $(VENV)/ready
 
-$(VENV)/ready:
+$(VENV)/ready: scripts/python.sh
 	@sh scripts/python.sh $(VENV)
 	@touch $@

@@ -36,6 +36,7 @@ mod engine;
 mod probe;
 
 pub mod output;
+pub mod provenance;
 
 pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
 pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, adapters};

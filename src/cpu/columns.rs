@@ -43,7 +43,7 @@ pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]
 
 /// The columns of each `size` draws, a multiple of 4.
 fn split(format: Format, words: &mut [u32], count: usize, size: usize) -> Vec<Column<'_>> {
-    let words_of = |values: usize| (values * format.element_bytes()).div_ceil(4);
+    let words_of = |values: usize| (values * format.element.size()).div_ceil(4);
     let plane = words_of(format.values(count as u64) as usize / format.planes());
     let mut columns: Vec<_> =
         (0..count.div_ceil(size)).map(|_| Column { format, planes: Vec::new() }).collect();
@@ -257,6 +257,7 @@ mod tests {
                     };
                     match format.element {
                         Element::U32 => assert_eq!(bytemuck::cast::<_, Tally>(words[i as usize]), tally),
+                        Element::F64 => unreachable!("draws are not in f64"),
                         Element::F32 => {
                             (0..format.width).for_each(|j| assert_eq!(words[at(j)], values[j].to_bits()))
                         }
