@@ -31,6 +31,11 @@ mod probe;
 
 pub mod output;
 
+#[cfg(feature = "report")]
+pub mod statistics;
+#[cfg(feature = "report")]
+pub mod stress;
+
 pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
 pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, adapters};
 pub use fit::{Fit, FitError};
