@@ -77,7 +77,7 @@ fn drawn_or_refused(engine: &Engine, builder: RecipeBuilder, bound: f64) -> Answ
             good(format!("refused: {}", first_sentence(&e.to_string())))
         }
         // What passes in f64 and never in f32 must not take 2^16 attempts a draw to find out.
-        _ => drawn(engine, builder.max_attempts(64), bound),
+        _ => drawn(engine, builder.max_attempts(1024), bound),
     }
 }
 
@@ -130,9 +130,13 @@ fn impossible_lrv(_: &Engine) -> Answer {
 
 fn dark_lrv(engine: &Engine) -> Answer {
     let model = builtin("munsell-vrhel");
-    all([1e-46, 1e-39, 1e-30, 1e-6].map(|lrv| {
-        (format!("{lrv:e}"), drawn_or_refused(engine, target(&model, lrv, Bounds::Scaled), SCALED_ERROR))
-    }))
+    let both = [1e-46, 1e-39, 1e-30, 1e-6].map(|lrv| {
+        [("base", Bounds::Base), ("scaled", Bounds::Scaled)].map(|(name, bounds)| {
+            let answer = drawn_or_refused(engine, target(&model, lrv, bounds), SCALED_ERROR);
+            (format!("{lrv:e} {name}"), answer)
+        })
+    });
+    all(both.into_iter().flatten())
 }
 
 fn largest_lrv(engine: &Engine) -> Answer {
@@ -142,11 +146,11 @@ fn largest_lrv(engine: &Engine) -> Answer {
         return Err("an LRV of 0.999 was not refused".to_owned());
     };
     let unreachable = |e: &RecipeError| matches!(e, RecipeError::UnreachableLrv { .. });
-    let hopeless = |e: &RecipeError| matches!(e, RecipeError::Hopeless { .. });
+    let no_room = |e: &RecipeError| matches!(e, RecipeError::Hopeless { .. } | RecipeError::Empty { .. });
     let said = |answer: Answer, as_what: &str| answer.and_then(|_| good(format!("refused as {as_what}")));
     all([
         ("0.95".to_owned(), drawn(engine, recipe(0.95), SCALED_ERROR)),
-        (format!("{largest:.6} - 1e-6"), said(refused(recipe(largest - 1e-6), hopeless), "hopeless")),
+        (format!("{largest:.6} - 1e-6"), said(refused(recipe(largest - 1e-6), no_room), "without room")),
         (format!("{largest:.6}"), said(refused(recipe(largest), unreachable), "unreachable")),
         (format!("{largest:.6} + 1e-6"), said(refused(recipe(largest + 1e-6), unreachable), "unreachable")),
     ])

@@ -18,10 +18,11 @@ use crate::stream::{Draws, Stream};
 /// Draws of a case.
 pub(super) const DRAWS: u64 = 10_000;
 
-/// The largest error of a value, in parts of the spectrum's peak: some ten roundings, and normals good to 4e-7.
+/// The largest error of a value, in parts of the size of its recipe: some ten roundings, and normals good to 4e-7.
 pub(super) const ERROR: f64 = 1e-6;
 
-/// The same where there is a target LRV: the darkest candidates are scaled up tenfold and more, and their errors too.
+/// The same in parts of the spectrum's peak, where there is a target LRV: the darkest candidates are scaled up tenfold
+/// and more, and their errors with them.
 pub(super) const SCALED_ERROR: f64 = 1e-5;
 
 /// The most draws of a case that may take another candidate than in f64 (once in 10^6 is expected).
@@ -87,7 +88,8 @@ pub(super) fn draw(engine: &Engine, recipe: &Recipe, draws: Draws) -> Result<(Ve
 
 /// What draws came to beside those in f64.
 pub(super) struct Examined {
-    /// The largest error of a value, in parts of its spectrum's peak.
+    /// The largest error of a value, in parts of the size of the recipe, or of the spectrum's peak where there is a
+    /// target.
     pub(super) error: f64,
     /// The largest error of the LRV, where there is a target.
     pub(super) lrv_error: f64,
@@ -107,6 +109,7 @@ pub(super) fn examine(engine: &Engine, recipe: &Recipe, draws: Draws) -> Result<
     if let Some(value) = spectra.iter().find(|&&v| !(v > 0.0 && v < limit)) {
         return Err(format!("a value of {value:e}, which is not physical"));
     }
+    let size = size(recipe);
     let rows = spectra.par_chunks_exact(recipe.model().bands()).zip(&tallies).enumerate();
     let errors: Vec<_> = rows
         .map(|(i, (row, tally))| {
@@ -115,8 +118,9 @@ pub(super) fn examine(engine: &Engine, recipe: &Recipe, draws: Draws) -> Result<
             if exact_tally.attempts() != tally.attempts() {
                 return None;
             }
-            let peak = spectrum.iter().copied().fold(0.0, f64::max);
-            let errors = row.iter().zip(&spectrum).map(|(&a, b)| (f64::from(a) - b).abs() / peak);
+            let peak = || spectrum.iter().copied().fold(0.0, f64::max);
+            let size = if program.target.is_some() { peak() } else { size };
+            let errors = row.iter().zip(&spectrum).map(|(&a, b)| (f64::from(a) - b).abs() / size);
             let lrv = program.target.as_ref().map_or(0.0, |target| {
                 let lrv: f64 = target.weights.iter().zip(row).map(|(w, &s)| w * f64::from(s)).sum();
                 (lrv / target.lrv - 1.0).abs()
@@ -137,6 +141,13 @@ pub(super) fn examine(engine: &Engine, recipe: &Recipe, draws: Draws) -> Result<
         most_attempts: tallies.iter().map(|t| t.attempts()).max().unwrap_or(0),
         acceptance: tallies.len() as f64 / attempts as f64,
     })
+}
+
+/// The largest term that spectra are usually made of: a band's mean, and one deviation.
+fn size(recipe: &Recipe) -> f64 {
+    let program = recipe.program();
+    let deviation = |b: usize| program.gain.iter().map(|gain| gain[b] * gain[b]).sum::<f64>().sqrt();
+    (0..program.bands()).map(|b| program.offset[b].abs() + deviation(b)).fold(0.0, f64::max)
 }
 
 /// A recipe that must be one.

@@ -2,7 +2,7 @@
 //! kind. None may hang, give what is not a number, or give a spectrum that is not physical.
 //!
 //! Tests demand every answer, and the report shows them for its user's adapter. Values are judged against the draw in
-//! f64 from the same words, in parts of the peak of the spectrum: what f32 rounds is a part of the largest term.
+//! f64 from the same words, in parts of the largest terms that they are made of, because that is what f32 rounds.
 
 mod bounds;
 mod counters;
@@ -48,7 +48,8 @@ pub struct Outcome {
     pub passed: bool,
     /// The answer in words.
     pub result: String,
-    /// The largest error found, where there are values: in parts of the spectrum's peak unless `result` says of what.
+    /// The largest error found, where there are values: in parts of the largest mean and deviation of a band, or of the
+    /// spectrum's peak where there is a target LRV, unless `result` says of what.
     pub error: Option<f64>,
     /// What the error may be.
     pub bound: Option<f64>,

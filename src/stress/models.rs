@@ -69,7 +69,8 @@ fn directions(model: &Model, turn: &DMatrix<f64>, variances: &[f64]) -> Result<(
         if variance > 0.0 && sigmas > SIGMAS {
             return Err(format!("direction {i} has the variance {found:.3e} instead of {variance:.3e}"));
         }
-        if variance == 0.0 && found > 1e-24 {
+        // The root of what rounding leaves of a largest variance.
+        if variance == 0.0 && found > 1e-15 * variances[0] {
             return Err(format!("direction {i} has the variance {found:.1e} instead of none"));
         }
     }
@@ -129,11 +130,12 @@ fn cancelling(engine: &Engine) -> Answer {
     drawn(engine, Recipe::new(&model), ERROR)
 }
 
+/// A sum of 64 terms rounds more often than one of 6.
 fn components(engine: &Engine) -> Answer {
     all([(1, 31), (2, 31), (31, 31), (64, 64)].map(|(k, bands)| {
         let covariance = diagonal((0..k).map(|j| 0.02 / (1.0 + j as f64).powi(2)));
         let model = model(Kind::Reflectance, vec![0.5; bands], covariance);
-        (format!("k = {k}"), drawn(engine, Recipe::new(&model), ERROR))
+        (format!("k = {k}"), drawn(engine, Recipe::new(&model), ERROR * f64::max(1.0, k as f64 / 32.0)))
     }))
 }
 
