@@ -36,6 +36,9 @@ pub mod statistics;
 #[cfg(feature = "report")]
 pub mod stress;
 
+#[cfg(feature = "report")]
+pub mod report;
+
 pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
 pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, adapters};
 pub use fit::{Fit, FitError};

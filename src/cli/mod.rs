@@ -6,6 +6,7 @@ mod bench;
 mod fit;
 mod inspect;
 mod picture;
+mod report;
 mod sample;
 
 use std::num::NonZeroUsize;
@@ -32,6 +33,7 @@ Examples:
   spectroll sample munsell-vrhel -n 10000 --lrv 0.4 --bounds scaled -o targets.npy
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
   spectroll inspect munsell-vrhel -o munsell-vrhel.png
+  spectroll report munsell-vrhel -o report --quick
 
 Exit codes: 0 done, 1 failed while running, 2 wrong usage or impossible request, 3 no such adapter,
 4 bad input data, 130 interrupted.";
@@ -43,6 +45,7 @@ enum Command {
     Inspect(inspect::Arguments),
     Adapters(adapters::Arguments),
     Bench(bench::Arguments),
+    Report(report::Arguments),
 }
 
 /// Where to draw.
@@ -108,6 +111,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Inspect(arguments) => inspect::run(arguments),
         Command::Adapters(arguments) => adapters::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
+        Command::Report(arguments) => report::run(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
