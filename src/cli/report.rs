@@ -157,15 +157,15 @@ impl Folder {
 }
 
 /// Refuses a name that is taken, unless by an earlier report that may be replaced.
-fn check(path: &Path, force: bool) -> Result<(), Usage> {
+fn check(path: &Path, force: bool) -> anyhow::Result<()> {
     let is_ours = path.join(MARK).is_file();
-    match (path.symlink_metadata().is_ok(), force, is_ours) {
-        (false, ..) | (true, true, true) => Ok(()),
-        (true, true, false) => Err(Usage(format!(
-            "{path:?} exists and is no report, so --force leaves it alone: choose another name"
-        ))),
-        (true, false, _) => Err(Usage(format!(
-            "{path:?} exists already: choose another name, or pass --force to replace a report"
-        ))),
+    match (path.symlink_metadata().is_ok(), force) {
+        (true, true) if !is_ours => {
+            Err(anyhow!("{path:?} is not a report, so --force leaves it alone: choose another name"))
+        }
+        (true, false) => {
+            Err(anyhow!("{path:?} exists already: choose another name, or pass --force to replace a report"))
+        }
+        _ => Ok(()),
     }
 }

@@ -41,8 +41,12 @@ pub(super) struct Axis {
 pub(super) enum Style {
     /// Points joined by a line.
     Line,
-    /// A broken line without points.
+    /// A line without points.
+    Plain,
+    /// A broken one.
     Dashed,
+    /// One of dots.
+    Dotted,
     /// Points alone.
     Points,
     /// Columns of a histogram, given by their lower edges and one end.
@@ -71,14 +75,20 @@ impl Axis {
         Axis { label: label.to_owned(), limits, logarithmic: false }
     }
 
-    /// An axis in decades that holds all positive values.
+    /// A logarithmic axis that holds all positive values, from a 1, 2 or 5 to another.
     pub(super) fn decades(label: &str, values: impl IntoIterator<Item = f64>) -> Axis {
         let values = values.into_iter().filter(|&v| v > 0.0 && v.is_finite());
         let (low, high) = values.fold((f64::INFINITY, 0f64), |(a, b), v| (a.min(v), b.max(v)));
         let (low, high) = if low < high { (low, high) } else { (0.1, 1.0) };
-        let limits = (10f64.powf((low / 1.2).log10().floor()), 10f64.powf((high * 1.2).log10().ceil()));
+        let limits = (round_down(low / 1.1), 1.0 / round_down(1.0 / (1.1 * high)));
         Axis { label: label.to_owned(), limits, logarithmic: true }
     }
+}
+
+/// The largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, 10, ... that is at most `value`.
+fn round_down(value: f64) -> f64 {
+    let decade = 10f64.powf(value.log10().floor());
+    [5.0, 2.0, 1.0].map(|m| m * decade).into_iter().find(|&v| v <= value).unwrap_or(decade)
 }
 
 impl Series {
@@ -101,6 +111,8 @@ impl Series {
         match self.style {
             Style::Line => plots.push(line().with_stroke_width(1.8).into()),
             Style::Dashed => plots.push(line().with_stroke_width(1.3).with_dashed().into()),
+            Style::Dotted => plots.push(line().with_stroke_width(1.6).with_dotted().into()),
+            Style::Plain => plots.push(line().with_stroke_width(1.8).into()),
             Style::Steps => {
                 let corners = self.points.windows(2).flat_map(|w| [w[0], (w[1].0, w[0].1)]);
                 let steps = LinePlot::new().with_data(corners.collect::<Vec<_>>()).with_color(self.colour);
@@ -164,10 +176,10 @@ impl Chart {
             .with_label_size(LABEL_SIZE)
             .with_tick_size(LABEL_SIZE - 1);
         if self.x.logarithmic {
-            layout = layout.with_log_x().with_x_tick_format(powers());
+            layout = layout.with_log_x().with_x_tick_format(powers(self.x.limits));
         }
         if self.y.logarithmic {
-            layout = layout.with_log_y().with_y_tick_format(powers());
+            layout = layout.with_log_y().with_y_tick_format(powers(self.y.limits));
         }
         layout
     }
@@ -217,7 +229,11 @@ impl Key<'_> {
                 y2: y,
                 stroke: self.series.colour.into(),
                 stroke_width: 2.4,
-                stroke_dasharray: (style == Style::Dashed).then(|| "6 3".into()),
+                stroke_dasharray: match style {
+                    Style::Dashed => Some("6 3".into()),
+                    Style::Dotted => Some("2 3".into()),
+                    _ => None,
+                },
             },
         };
         let text = Primitive::Text {
@@ -246,17 +262,18 @@ fn set_heading(element: &mut Primitive) {
     }
 }
 
-/// Powers of ten as such.
-fn powers() -> TickFormat {
-    TickFormat::Custom(Arc::new(|value| {
-        let exponent = value.log10().round();
-        if (value.log10() - exponent).abs() > 1e-6 {
-            return String::new(); // between decades
-        }
-        match exponent as i32 {
-            0 => "1".to_owned(),
-            1 => "10".to_owned(),
-            n => format!("10{}", superscript(n)),
+/// Powers of ten as such. What lies between them is named where there is room, on axes of less than two decades.
+fn powers((low, high): (f64, f64)) -> TickFormat {
+    let few = high / low < 100.0;
+    TickFormat::Custom(Arc::new(move |value| {
+        let exponent = value.log10().floor() as i32;
+        let digit = (value / 10f64.powi(exponent)).round();
+        let (digit, exponent) = if digit == 10.0 { (1.0, exponent + 1) } else { (digit, exponent) };
+        match (digit == 1.0, exponent) {
+            (false, _) if !few => String::new(),
+            (_, -2..=1) => format!("{}", (value * 1e6).round() / 1e6),
+            (true, n) => format!("10{}", superscript(n)),
+            (false, n) => format!("{digit}·10{}", superscript(n)),
         }
     }))
 }
@@ -280,6 +297,12 @@ mod tests {
     #[test]
     fn exponents_are_raised() {
         assert_eq!([-12, 3, 40].map(superscript), ["⁻¹²", "³", "⁴⁰"]);
+    }
+
+    #[test]
+    fn axes_end_on_round_numbers() {
+        assert_eq!([0.99, 1.0, 3.4, 7e-5].map(round_down), [0.5, 1.0, 2.0, 5e-5]);
+        assert_eq!(Axis::decades("", [0.0017, 1.0]).limits, (1e-3, 2.0));
     }
 
     #[test]

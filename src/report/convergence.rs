@@ -84,15 +84,15 @@ pub(super) fn measure(bench: &Bench, name: &str, recipe: &Recipe) -> Result<Conv
             bench.say(&format!("{name}: {draws} draws by {}", target.facts.name))?;
             let [least, largest] = REPLICATES;
             let replicates = (least * most / draws).clamp(least, largest);
-            let (seconds, errors) = runs.replicates(draws, replicates)?;
+            let measured = runs.replicates(draws, replicates)?;
             points.push(Point {
                 engine,
                 draws,
                 replicates,
-                seconds: spread(&seconds),
-                errors: [0, 1, 2].map(|quantity| interval(&errors, quantity)),
+                seconds: spread(&measured.seconds),
+                errors: [0, 1, 2].map(|quantity| interval(&measured.errors, quantity)),
             });
-            all.push((draws, seconds, errors));
+            all.push(measured);
         }
         merits.push(merit(engine, runs.first_draw, &all));
     }
@@ -160,8 +160,8 @@ impl<'a> Runs<'a> {
         Ok(Runs { bench, recipe, reference, runner, first_draw })
     }
 
-    /// The times and the errors of replicates.
-    fn replicates(&mut self, draws: u64, count: u64) -> Result<(Vec<f64>, Vec<[f64; 3]>), ReportError> {
+    /// `count` replicates of so many draws.
+    fn replicates(&mut self, draws: u64, count: u64) -> Result<Replicates, ReportError> {
         let stream = Stream::named(self.bench.seed, &format!("{draws} draws"));
         self.runner.time(self.bench, stream.draws(0..draws))?; // buffers and windows find their size
         let (mut seconds, mut errors) = (Vec::new(), Vec::new());
@@ -171,8 +171,15 @@ impl<'a> Runs<'a> {
             let estimate = moments(self.bench, &mut self.runner, self.recipe, range)?.estimate();
             errors.push(estimate.errors(self.reference));
         }
-        Ok((seconds, errors))
+        Ok(Replicates { draws, seconds, errors })
     }
+}
+
+/// The times and the errors of replicates of a number of draws.
+struct Replicates {
+    draws: u64,
+    seconds: Vec<f64>,
+    errors: Vec<[f64; 3]>,
 }
 
 /// The median, the least and the most.
@@ -189,23 +196,22 @@ fn interval(errors: &[[f64; 3]], quantity: usize) -> Interval {
     bootstrap(&[errors.len()], |picks| picked(errors, quantity, &picks[0]))
 }
 
-fn merit(engine: usize, first_draw: f64, all: &[(u64, Vec<f64>, Vec<[f64; 3]>)]) -> Merit {
-    let lengths: Vec<usize> = all.iter().map(|(_, _, errors)| errors.len()).collect();
+fn merit(engine: usize, first_draw: f64, all: &[Replicates]) -> Merit {
+    let lengths: Vec<usize> = all.iter().map(|r| r.errors.len()).collect();
     let slope = bootstrap(&lengths, |picks| {
-        let points = all
-            .iter()
-            .zip(picks)
-            .map(|((draws, _, errors), picks)| ((*draws as f64).ln(), picked(errors, 0, picks).ln()));
-        slope(&points.collect::<Vec<_>>())
+        let point = |(r, picks): (&Replicates, &Vec<usize>)| {
+            ((r.draws as f64).ln(), picked(&r.errors, 0, picks).ln())
+        };
+        slope(&all.iter().zip(picks).map(point).collect::<Vec<_>>())
     });
-    let (draws, seconds, errors) = all.last().expect("there are numbers of draws");
-    let seconds = median(seconds);
+    let most = all.last().expect("there are numbers of draws");
+    let seconds = median(&most.seconds);
     let scaled = |v: f64| v * v * seconds;
-    let error = interval(errors, 0);
+    let error = interval(&most.errors, 0);
     Merit {
         engine,
         first_draw,
-        nanoseconds: 1e9 * seconds / *draws as f64,
+        nanoseconds: 1e9 * seconds / most.draws as f64,
         slope,
         error2_seconds: Interval {
             value: scaled(error.value),

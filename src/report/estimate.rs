@@ -161,7 +161,7 @@ pub(super) fn bootstrap(lengths: &[usize], statistic: impl Fn(&[Vec<usize>]) -> 
         .map(|round| {
             let pick = |list: usize, i: usize, n: usize| {
                 let [word, ..] = philox([i as u32, list as u32, round, 0], [0xB007, 0x57A9]);
-                (u64::from(word) * n as u64 >> 32) as usize
+                ((u64::from(word) * n as u64) >> 32) as usize
             };
             let picks = |(list, &n): (usize, &usize)| (0..n).map(|i| pick(list, i, n)).collect();
             statistic(&lengths.iter().enumerate().map(picks).collect::<Vec<_>>())
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn an_interval_covers_its_value() {
-        let values: Vec<f64> = (0..20).map(|i| f64::from(i)).collect();
+        let values: Vec<f64> = (0..20).map(f64::from).collect();
         let interval = bootstrap(&[20], |picks| picks[0].iter().map(|&i| values[i]).sum::<f64>() / 20.0);
         assert_eq!(interval.value, 9.5);
         // A mean of 20 of deviation 5.77 has the standard error 1.29.

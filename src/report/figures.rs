@@ -98,7 +98,7 @@ impl Drawing<'_> {
         series.push(Series::new(
             "error of the reference",
             GUIDE,
-            Style::Dashed,
+            Style::Dotted,
             vec![(low, own), (high, own)],
         ));
         series.insert(0, Series::new("slope −½", GUIDE, Style::Dashed, Vec::new()));
@@ -114,14 +114,16 @@ impl Drawing<'_> {
         };
         let see = match quantity {
             0 => format!(
-                "Every engine’s error falls as one over the root of its time once starting up no longer counts: it lies \
-                 on its broken line of slope −½. The engine farthest to the left is the cheapest. A floor, where f32 is \
-                 biased, would bend a curve to the level; {}",
+                "An error of chance falls as one over the root of the time: along the broken lines of slope −½, once \
+                 starting up no longer counts. The farther left a curve, the cheaper its engine. All engines draw from the \
+                 same words, so their errors are equal and only their times differ. The bias of f32 would bend a curve to \
+                 the level: {}",
                 self.floor()
             ),
-            1 => "The covariance is as cheap to know as the mean: same slope, same order of engines."
+            1 => "The same for the covariance of the weights (Frobenius norm): it too is known to one over the root \
+                  of the time."
                 .to_owned(),
-            _ => "The share of accepted candidates, which comes of the same draws for nothing.".to_owned(),
+            _ => "The same for the share of candidates that are accepted.".to_owned(),
         };
         let (least, most) = self.replicates();
         let numbers = format!(
@@ -153,23 +155,32 @@ impl Drawing<'_> {
 
     fn error_beside_theory(&self) -> Figure {
         let reference = &self.model.convergence.reference;
-        let mut series = Vec::new();
+        let (mut series, mut covered, mut all) = (Vec::new(), 0, 0);
         for engine in 0..self.report.engines.len() {
             let (name, colour) = self.engine(engine);
             // Side by side, so that none hides another.
-            let shift = 1.0 + 0.14 * engine as f64;
-            let scale = |p: &Point| reference.errors[0] * (reference.draws as f64 / p.draws as f64).sqrt();
+            let shift = 1.0 + 0.25 * engine as f64;
+            // The reference errs too.
+            let scale =
+                |p: &Point| reference.errors[0] * (1.0 + reference.draws as f64 / p.draws as f64).sqrt();
             let points = self.points(engine).map(|p| (p.draws as f64 * shift, p.errors[0].value / scale(p)));
             series.push(Series::new(name, colour, Style::Points, points.collect()));
             for p in self.points(engine) {
-                let x = p.draws as f64 * shift;
-                let interval = vec![(x, p.errors[0].low / scale(p)), (x, p.errors[0].high / scale(p))];
-                series.push(Series { style: Style::Steps, ..Series::new("", colour, Style::Line, interval) });
+                let (x, low, high) =
+                    (p.draws as f64 * shift, p.errors[0].low / scale(p), p.errors[0].high / scale(p));
+                series.push(Series::new("", colour, Style::Plain, vec![(x, low), (x, high)]));
+                all += 1;
+                covered += u32::from((low..=high).contains(&1.0));
             }
         }
         let draws = || self.model.convergence.points.iter().map(|p| p.draws as f64);
         let (first, last) = (draws().fold(f64::INFINITY, f64::min), draws().fold(0.0, f64::max));
-        series.push(Series::new("theory", GUIDE, Style::Dashed, vec![(first / 2.0, 1.0), (3.0 * last, 1.0)]));
+        series.push(Series::new(
+            "chance alone",
+            GUIDE,
+            Style::Dashed,
+            vec![(first / 2.0, 1.0), (3.0 * last, 1.0)],
+        ));
         let most = series.iter().flat_map(|s| &s.points).map(|p| p.1).fold(1.4, f64::max);
         let slopes = self.model.convergence.merits.iter().map(|m| {
             let (name, _) = self.engine(m.engine);
@@ -182,8 +193,10 @@ impl Drawing<'_> {
             series,
         };
         let see = format!(
-            "All intervals cover 1: no engine has any error but that of chance, at any number of draws. Fitted slopes of \
-             log error over log draws, with 95 % intervals: {}; chance alone has −0.500.",
+            "An engine whose only error is that of chance lies at 1 whatever the number of draws: {covered} of {all} \
+             intervals cover it. Bootstrap intervals of so few replicates are somewhat narrow, and engines share their words, \
+             so that they stray together. Fitted slopes of log error over log draws, with 95 % intervals: {}; of chance \
+             alone −0.500.",
             slopes.collect::<Vec<_>>().join(", ")
         );
         let (least, most) = self.replicates();
@@ -208,8 +221,8 @@ impl Drawing<'_> {
             y: Axis::decades("largest error of a normal", functions.iter().map(|f| f.normal)),
             series: series.collect(),
         };
-        let see = "Lower is more accurate, left is cheaper. The polynomials of the shader are good to the last digits of \
-                   f32 whatever the adapter; what its built-in functions are good to is the adapter’s choice."
+        let see = "Lower is more accurate, left is cheaper. The same polynomials run everywhere; what built-in functions \
+                   are good to is each adapter’s choice."
             .to_owned();
         let candidates = functions.first().map_or(0, |f| f.candidates);
         let numbers = format!("{} candidates of {} normals", grouped(candidates), self.model.components);
@@ -238,8 +251,8 @@ impl Drawing<'_> {
             series,
         };
         let see = format!(
-            "Difficult draws cost what their candidates cost: points on or below the broken lines. (Below, because an \
-             accepted spectrum must be stored too.) {}",
+            "On its broken line a draw costs as much as its candidates, however many they are. Points below it are of \
+             candidates that cost less than the easiest draw: most are not stored. {}",
             self.refused()
         );
         let draws = tasks.iter().map(|t| t.draws);
@@ -321,8 +334,8 @@ impl Drawing<'_> {
         };
         let last = all.last().map_or(1.0, |s| s.determinant_ratio);
         let see = format!(
-            "Where nothing is rejected the ratio is 1. With the data’s own covariance accepted draws fill {last:.3} of the \
-             Gaussian’s volume (squared): rejection makes the draws less varied than the Gaussian."
+            "Where nothing is rejected the ratio is 1. With the data’s own covariance (factor 1) it is {last:.3}: what is \
+             rejected lies outside, so accepted draws vary less than the Gaussian that was fitted."
         );
         let draws = all.first().map_or(0, |s| s.draws);
         self.figure(

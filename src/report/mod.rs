@@ -16,6 +16,7 @@ mod figures;
 mod functions;
 mod page;
 mod randomness;
+mod summary;
 
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
@@ -29,8 +30,9 @@ pub use estimate::Interval;
 pub use fidelity::{AboveOne, Fidelity, Shrinkage, Spread};
 pub use figures::{Figure, figures};
 pub use functions::Functions;
-pub use page::{Verdict, page};
+pub use page::page;
 pub use randomness::{CheckRow, GroupRow, Randomness};
+pub use summary::Verdict;
 
 use crate::engine::{Choice, Engine, EngineError};
 use crate::model::Model;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::figures::{Figure, grouped, number};
-use super::{Effort, ModelReport, Report};
+use super::{CheckRow, Effort, ModelReport, Report};
 use crate::stress::Outcome;
 
 const STYLE: &str = "\
@@ -15,8 +15,7 @@ figcaption{font-size:.92em}figcaption small{display:block;color:#5b626c;margin-t
 table{border-collapse:collapse;font-size:.9em;margin:1em 0;display:block;overflow-x:auto}\
 th,td{padding:.3em .7em;text-align:right;border-bottom:1px solid #e6e8eb;vertical-align:top}\
 th{background:#f4f5f7;font-weight:600}td.text,th.text{text-align:left;max-width:34em}\
-.good{color:#00694e}.bad{color:#b3261e;font-weight:600}caption{text-align:left;padding:.4em 0;color:#5b626c}\
-nav a{margin-right:1.2em}";
+.good{color:#00694e}.bad{color:#b3261e;font-weight:600}caption{text-align:left;padding:.4em 0;color:#5b626c}"
 
 /// The page, with these figures in it.
 pub fn page(report: &Report, figures: &[Figure]) -> String {
@@ -34,12 +33,12 @@ pub fn page(report: &Report, figures: &[Figure]) -> String {
         let plots = |section| plots(figures, section, Some(index));
         let _ = write!(
             html,
-            "<h1>{}</h1><p>{} of {} components at {} nm, {} bands.</p>",
+            "<h1>{}</h1><p>{}s: {} bands at {} nm, {} components.</p>",
             escape(&model.name),
             model.kind,
-            model.components,
+            model.bands,
             model.grid,
-            model.bands
+            model.components
         );
         html += "<h2>1. Statistical error against run time</h2>\n\
                  <p>What a user pays for: how long until the draws say what the distribution is. The error is the root \
@@ -100,91 +99,12 @@ fn summary_html(report: &Report) -> String {
     )
 }
 
-/// What is right and what is not, in numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Verdict {
-    /// Stiff and extreme cases with their right answer, and all.
-    pub cases: [usize; 2],
-    /// Checks of distributions that raise no alarm, and all.
-    pub checks: [usize; 2],
-    /// Known answers of the generator, and all.
-    pub answers: [usize; 2],
-}
-
-impl Verdict {
-    /// Whether nothing is wrong.
-    pub fn is_good(&self) -> bool {
-        [self.cases, self.checks, self.answers].iter().all(|[good, all]| good == all)
-    }
-}
-
-impl std::fmt::Display for Verdict {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        let [cases, checks, answers] = [self.cases, self.checks, self.answers];
-        write!(
-            f,
-            "{} of {} stiff and extreme cases have their right answer; {} of {} checks of distributions raise no alarm; \
-             {} of {} known answers of the generator",
-            cases[0], cases[1], checks[0], checks[1], answers[0], answers[1]
-        )
-    }
-}
-
-impl Report {
-    /// What is right and what is not.
-    pub fn verdict(&self) -> Verdict {
-        let outcomes = || self.stress.iter().flat_map(|run| &run.outcomes);
-        let checks = &self.randomness.checks;
-        Verdict {
-            cases: [outcomes().filter(|o| o.passed).count(), outcomes().count()],
-            checks: [checks.iter().filter(|c| c.alarm.is_none()).count(), checks.len()],
-            answers: self.randomness.known_answers,
-        }
-    }
-
-    /// The outcome in a few lines for a terminal.
-    pub fn summary(&self) -> String {
-        let mut text = String::new();
-        for model in &self.models {
-            let _ = writeln!(text, "{}: {} bands, {} components", model.name, model.bands, model.components);
-            for merit in &model.convergence.merits {
-                let _ = writeln!(
-                    text,
-                    "  {:<24} {:>8.1} ns a draw, error² × time {} (slope {:.3})",
-                    self.engines[merit.engine].name,
-                    merit.nanoseconds,
-                    number(merit.error2_seconds.value),
-                    merit.slope.value
-                );
-            }
-            for variant in &model.accuracy.variants {
-                let _ = writeln!(
-                    text,
-                    "  {:<42} error {} at most, {} flips per million",
-                    variant.name,
-                    number(variant.spectra.max),
-                    number(variant.flips_per_million)
-                );
-            }
-        }
-        let _ = writeln!(text, "{}", self.verdict());
-        for outcome in self.stress.iter().flat_map(|run| &run.outcomes).filter(|o| !o.passed) {
-            let _ = writeln!(text, "WRONG: {}: {}", outcome.name, outcome.result);
-        }
-        for check in self.randomness.checks.iter().filter(|c| c.alarm.is_some()) {
-            let alarm = check.alarm.as_deref().unwrap_or_default();
-            let _ = writeln!(text, "ALARM: {}, {}: {alarm}", check.scenario, check.check);
-        }
-        text
-    }
-}
-
 fn plots(figures: &[Figure], section: usize, model: Option<usize>) -> String {
     let mut html = String::from("<div class=\"plots\">\n");
     for figure in figures.iter().filter(|f| f.section == section && f.model == model) {
-        let _ = write!(
+        let _ = writeln!(
             html,
-            "<figure id=\"{}\">{}<figcaption>{}<small>{}</small></figcaption></figure>\n",
+            "<figure id=\"{}\">{}<figcaption>{}<small>{}</small></figcaption></figure>",
             figure.name,
             figure.svg,
             escape(&figure.see),
@@ -361,23 +281,32 @@ fn randomness(report: &Report) -> String {
         1,
         groups,
     );
-    let checks = randomness.checks.iter().map(|c| {
-        let verdict = match &c.alarm {
-            None => "<span class=\"good\">no alarm</span>".to_owned(),
-            Some(alarm) => format!("<span class=\"bad\">{}</span>", escape(alarm)),
-        };
-        let p = if c.comparisons > 0 { number(c.p) } else { "–".to_owned() };
-        vec![
-            escape(&report.engines[c.engine].name),
-            escape(&c.scenario),
-            c.check.to_owned(),
-            c.compares.to_owned(),
-            verdict,
-            c.comparisons.to_string(),
-            p,
-        ]
+    html += &checks(report);
+    html
+}
+
+/// The checks of draws, a row for each scenario and check, a column for each engine.
+fn checks(report: &Report) -> String {
+    let randomness = &report.randomness;
+    let mut engines: Vec<usize> = randomness.checks.iter().map(|c| c.engine).collect();
+    engines.sort_unstable();
+    engines.dedup();
+    let names: Vec<String> =
+        engines.iter().map(|&e| format!("{}: p", escape(&report.engines[e].name))).collect();
+    let head =
+        ["draws of", "check", "compares", "comparisons"].into_iter().chain(names.iter().map(String::as_str));
+    let first = randomness.checks.iter().filter(|c| c.engine == engines[0]);
+    let rows = first.map(|c| {
+        let cells = engines.iter().map(|&engine| {
+            let same = |other: &&CheckRow| {
+                (other.engine, &other.scenario, other.check) == (engine, &c.scenario, c.check)
+            };
+            randomness.checks.iter().find(same).map_or(String::new(), verdict)
+        });
+        let texts = [escape(&c.scenario), c.check.to_owned(), powers(c.compares), c.comparisons.to_string()];
+        texts.into_iter().chain(cells).collect()
     });
-    html += &table(
+    table(
         &format!(
             "Draws beside those of an independent sampler: {} draws each. A check of sound draws raises a false alarm once \
              in {} times; p is the probability that they look as bad in any of the comparisons. A check without \
@@ -386,11 +315,18 @@ fn randomness(report: &Report) -> String {
             number(1.0 / randomness.false_alarms),
             smallest(report)
         ),
-        &["engine", "draws of", "check", "compares", "verdict", "comparisons", "p"],
-        5,
-        checks,
-    );
-    html
+        &head.collect::<Vec<_>>(),
+        3,
+        rows,
+    )
+}
+
+fn verdict(check: &CheckRow) -> String {
+    match &check.alarm {
+        Some(alarm) => format!("<span class=\"bad\">{}</span>", escape(alarm)),
+        None if check.comparisons > 0 => number(check.p),
+        None => "<span class=\"good\">sound</span>".to_owned(),
+    }
 }
 
 /// The smallest errors that the checks see.
@@ -428,9 +364,9 @@ fn stress(report: &Report) -> String {
         let class = if wrong.passed { "good" } else { "bad" };
         let cells = all().flat_map(|o| [error(o), format!("{:.2}", o.seconds)]);
         let texts = [
-            outcome.name.to_owned(),
-            outcome.could_break.to_owned(),
-            format!("<span class=\"{class}\">{}</span>", escape(&wrong.result)),
+            powers(outcome.name),
+            powers(outcome.could_break),
+            format!("<span class=\"{class}\">{}</span>", powers(&wrong.result)),
         ];
         texts.into_iter().chain(cells).collect()
     });
@@ -450,4 +386,27 @@ fn error(outcome: &Outcome) -> String {
 
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Text with its powers raised: 10^-9.
+fn powers(text: &str) -> String {
+    let text = escape(text);
+    let mut parts = text.split('^');
+    let mut html = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let end = part.find(|c: char| !(c.is_ascii_digit() || c == '-')).unwrap_or(part.len());
+        let (exponent, rest) = part.split_at(end);
+        let _ = write!(html, "<sup>{}</sup>{rest}", exponent.replace('-', "−"));
+    }
+    html
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_are_raised_and_markup_is_text() {
+        assert_eq!(powers("10^-9 < 2^32, k"), "10<sup>−9</sup> &lt; 2<sup>32</sup>, k");
+    }
 }

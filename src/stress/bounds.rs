@@ -73,7 +73,8 @@ fn outside(engine: &Engine) -> Answer {
 fn drawn_or_refused(engine: &Engine, builder: RecipeBuilder, bound: f64) -> Answer {
     use RecipeError::{Empty, Hopeless, Lrv, Scale, UnreachableLrv};
     match builder.clone().build() {
-        Err(e @ (Empty { .. } | Hopeless { .. } | Lrv(_) | Scale(_) | UnreachableLrv { .. })) => {
+        Err(Lrv(_) | Scale(_)) => good("refused, beyond f32"),
+        Err(e @ (Empty { .. } | Hopeless { .. } | UnreachableLrv { .. })) => {
             good(format!("refused: {}", first_sentence(&e.to_string())))
         }
         // What passes in f64 and never in f32 must not take 2^16 attempts a draw to find out.
@@ -124,7 +125,8 @@ fn no_variation(engine: &Engine) -> Answer {
 fn impossible_lrv(_: &Engine) -> Answer {
     let model = builtin("munsell-vrhel");
     all([0.0, 1.0].map(|lrv| {
-        (format!("{lrv}"), refused(Recipe::new(&model).lrv(lrv), |e| matches!(e, RecipeError::Lrv(_))))
+        let answer = refused(Recipe::new(&model).lrv(lrv), |e| matches!(e, RecipeError::Lrv(_)));
+        (format!("{lrv}"), answer.and_then(|_| good("refused, not between 0 and 1")))
     }))
 }
 

@@ -184,26 +184,24 @@ pub(super) fn first_sentence(message: &str) -> &str {
     message.split("; ").next().unwrap_or(message)
 }
 
-/// The answers of several parts as one: all results in order, and the error closest to its bound.
+/// The answers of several parts as one: their results, once where they are the same, and the error closest to its
+/// bound.
 pub(super) fn all(parts: impl IntoIterator<Item = (String, Answer)>) -> Answer {
     let mut whole = super::Good::default();
-    let mut results = Vec::new();
+    let mut results: Vec<(String, String)> = Vec::new();
     for (name, answer) in parts {
         let part = answer.map_err(|e| format!("{name}: {e}"))?;
-        results.push(format!("{name}: {}", part.result));
+        match results.iter_mut().find(|(_, result)| *result == part.result) {
+            Some((names, _)) => *names += &format!(", {name}"),
+            None => results.push((name, part.result)),
+        }
         let closeness = |error: &Option<(f64, f64)>| error.map_or(-1.0, |(error, bound)| error / bound);
         if closeness(&part.error) > closeness(&whole.error) {
             whole.error = part.error;
         }
     }
-    // What is the same for all parts is said once.
-    let answers: Vec<_> = results.iter().map(|r| r.split_once(": ").unwrap_or(("", r))).collect();
-    whole.result = match answers.as_slice() {
-        [(_, first), rest @ ..] if rest.iter().all(|(_, other)| other == first) => {
-            format!("{}: {first}", answers.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", "))
-        }
-        _ => results.join("; "),
-    };
+    let results = results.into_iter().map(|(names, result)| format!("{names}: {result}"));
+    whole.result = results.collect::<Vec<_>>().join("; ");
     Ok(whole)
 }
 
