@@ -262,16 +262,19 @@ fn set_heading(element: &mut Primitive) {
     }
 }
 
-/// Powers of ten as such. What lies between them is named where there is room, on axes of less than two decades.
+/// Powers of ten as such, unless all are short. What lies between them is named where there is room, on axes of two
+/// decades or less.
 fn powers((low, high): (f64, f64)) -> TickFormat {
-    let few = high / low < 100.0;
+    let (few, short) = (high / low < 101.0, low > 0.9e-3 && high < 1.1e4);
     TickFormat::Custom(Arc::new(move |value| {
         let exponent = value.log10().floor() as i32;
         let digit = (value / 10f64.powi(exponent)).round();
         let (digit, exponent) = if digit == 10.0 { (1.0, exponent + 1) } else { (digit, exponent) };
         match (digit == 1.0, exponent) {
             (false, _) if !few => String::new(),
-            (_, -2..=1) => format!("{}", (value * 1e6).round() / 1e6),
+            _ if short => format!("{}", (value * 1e6).round() / 1e6),
+            (true, 0) => "1".to_owned(),
+            (true, 1) => "10".to_owned(),
             (true, n) => format!("10{}", superscript(n)),
             (false, n) => format!("{digit}·10{}", superscript(n)),
         }
