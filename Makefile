@@ -1,5 +1,5 @@
 # Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
-.PHONY: demo test bench driver python
+.PHONY: demo test exhaustive bench driver python
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
@@ -15,6 +15,10 @@ demo:
 
 test: driver python
 	cargo test --locked --release
+
+# What takes minutes: all 2^32 words through the radius and the circle, and the statistics under 200 seeds.
+exhaustive:
+	cargo test --locked --release --lib --test statistics -- --ignored --nocapture
 
 # In-process and whole-process rates, beside NumPy and Numba.
 bench: driver python

@@ -38,6 +38,14 @@ mod probe;
 pub mod output;
 pub mod provenance;
 
+#[cfg(feature = "report")]
+pub mod statistics;
+#[cfg(feature = "report")]
+pub mod stress;
+
+#[cfg(feature = "report")]
+pub mod report;
+
 pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
 pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, adapters};
 pub use fit::{Fit, FitError};

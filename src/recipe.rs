@@ -93,7 +93,7 @@ pub enum Luminance {
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum RecipeError {
     #[error(
-        "a target luminous reflectance of {0}: it must be above 0 and below 1, where 1 is a perfect white"
+        "a target luminous reflectance of {0}: it must be above 0 and below 1, where 1 is a perfect white, and 1e-30 at least"
     )]
     Lrv(f64),
     #[error("a target luminous reflectance belongs to reflectances, and this model is of illuminants")]
@@ -418,7 +418,8 @@ impl RecipeBuilder {
     }
 
     fn target(&self, lrv: f64) -> Result<Target, RecipeError> {
-        if !(lrv > 0.0 && lrv < 1.0) {
+        // Far below, spectra would round to 0; just below 1, to 1.
+        if !(1e-30..1.0).contains(&f64::from(lrv as f32)) {
             return Err(RecipeError::Lrv(lrv));
         }
         if self.model.kind() == Kind::Illuminant {
@@ -430,17 +431,26 @@ impl RecipeBuilder {
     }
 }
 
-/// Numbers must survive rounding to f32, with room for sums and for a scale of 10^6 either way.
+/// Numbers must survive rounding to f32, with room for sums and for a scale of 10^6 either way; where there is a
+/// target, so must the LRV of dark candidates, by which all are divided. No band may be below f32's normal range, which
+/// adapters may flush to 0.
 fn check_scale(program: &Program) -> Result<(), RecipeError> {
-    let largest = |values: &[f64]| values.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
     let Affine { offset, gain } = &program.spectrum;
-    let largest = gain.iter().map(|gain| largest(gain)).fold(largest(offset), f64::max);
-    if (1e-30..1e30).contains(&largest) { Ok(()) } else { Err(RecipeError::Scale(largest)) }
+    let size = |b: usize| gain.iter().fold(offset[b].abs(), |a, gain| a.max(gain[b].abs()));
+    let sizes = || (0..program.bands()).map(size);
+    let (least, largest) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
+    let low = if program.target.is_some() { 1e-20 } else { 1e-30 };
+    if !(low..1e30).contains(&largest) {
+        return Err(RecipeError::Scale(largest));
+    }
+    let is_lost = least > 0.0 && least < f64::from(f32::MIN_POSITIVE);
+    if is_lost { Err(RecipeError::Scale(least)) } else { Ok(()) }
 }
 
-/// The share of accepted candidates, of a stream of its own.
+/// The share of accepted candidates, of a stream of its own. In f32, as draws are made: what passes in f64 may have no
+/// room there.
 fn pilot(program: &Program) -> f64 {
-    let kernel = Kernel::<f64>::new(program);
+    let kernel = Kernel::<f32>::new(program);
     let stream = Stream::named(0, "pilot");
     let accepted = (0..PILOT).into_par_iter().filter(|&index| kernel.accepts(|b| stream.block(index, 0, b)));
     accepted.count() as f64 / PILOT as f64

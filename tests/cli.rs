@@ -138,12 +138,45 @@ fn a_model_is_fitted_and_drawn_from() {
 }
 
 /// Ctrl-C in the middle of a large file: exit code 130, soon, and nothing left behind.
+/// The page needs nothing else, and the numbers are all there.
+#[test]
+fn a_report_is_a_folder_that_appears_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("mine")).unwrap();
+    fails(folder.path(), "report -o mine --quick", 1, "exists already");
+    fails(folder.path(), "report -o mine --quick --force", 1, "not a report");
+    fails(folder.path(), "report -o x --quick --full", 2, "cannot be used with");
+    fails(folder.path(), "report -o no/such --quick", 1, "cannot write into");
+    fails(folder.path(), "report nonesuch -o x --quick", 2, "neither a file nor a built-in model");
+
+    let (out, _) = succeeds(folder.path(), "report granada -o x --quick --engine cpu --seed 5");
+    assert!(out.contains("36 of 36 stiff and extreme cases"), "{out}");
+    assert_eq!(files(folder.path()), ["mine", "x"]);
+    let x = folder.path().join("x");
+    let page = fs::read_to_string(x.join("report.html")).unwrap();
+    let svgs = files(&x).iter().filter(|name| name.ends_with(".svg")).count();
+    assert_eq!(page.matches("<svg").count(), svgs);
+    let loads = ["src=", "href=", "@import", "url("];
+    assert!(loads.iter().all(|load| !page.contains(load)), "the page loads something");
+    for figure in page.split("<figcaption>").skip(1) {
+        assert!(figure.contains("Seed 5.") && figure.contains(" UTC."), "{figure}");
+    }
+    let text = fs::read_to_string(x.join("report.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&json["seed"], &json["effort"]), (&5.into(), &"quick".into()));
+    assert!(json["models"][0]["convergence"]["points"].as_array().unwrap().len() >= 8);
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    for engine in ["gpu", "cpu"] {
-        let arguments = ["sample", "munsell-vrhel", "-n", "1e9", "-o", "big.npy", "--engine", engine];
+    for arguments in [
+        "sample munsell-vrhel -n 1e9 -o big.npy --engine gpu",
+        "sample munsell-vrhel -n 1e9 -o big.npy --engine cpu",
+        "report munsell-vrhel -o folder --engine cpu",
+    ] {
+        let arguments = arguments.split_whitespace();
         let mut child = Command::new(PROGRAM).args(arguments).current_dir(folder.path()).spawn().unwrap();
         let start = Instant::now();
         while files(folder.path()).is_empty() {

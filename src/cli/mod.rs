@@ -10,6 +10,7 @@ mod generate;
 mod inspect;
 mod picture;
 mod progress;
+mod report;
 mod request;
 mod sample;
 mod shader;
@@ -47,6 +48,7 @@ Examples:
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
   spectroll shader granada --quantities srgb --prefix sun > sun.wgsl
   spectroll inspect munsell-vrhel -o munsell-vrhel.png
+  spectroll report munsell-vrhel -o report --quick
 
 Exit codes: 0 done, 1 failed while running, 2 wrong usage or impossible request, 3 no such adapter,
 4 bad input data, 5 a data set is not what was written, 130 interrupted.";
@@ -61,6 +63,7 @@ enum Command {
     Shader(shader::Arguments),
     Adapters(adapters::Arguments),
     Bench(bench::Arguments),
+    Report(report::Arguments),
     Completions(generate::CompletionsArguments),
     Man(generate::ManArguments),
 }
@@ -152,6 +155,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Shader(arguments) => shader::run(arguments),
         Command::Adapters(arguments) => adapters::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
+        Command::Report(arguments) => report::run(arguments),
         Command::Completions(arguments) => generate::completions(Arguments::command(), arguments),
         Command::Man(arguments) => generate::man(Arguments::command(), arguments),
     }

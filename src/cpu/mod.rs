@@ -130,6 +130,12 @@ impl<R: Real> Kernel<R> {
         }
     }
 
+    /// The number of bands.
+    #[cfg(feature = "report")]
+    pub(crate) fn bands(&self) -> usize {
+        self.spectrum.offset.len()
+    }
+
     /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
     pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, Tally) {
         struct Only<'a, R>(&'a Kernel<R>, Option<(Vec<Vec<R>>, Tally)>);

@@ -228,8 +228,8 @@ impl Engine {
         }
     }
 
-    /// The device that draws and its queue, for tests of what runs on it.
-    #[cfg(test)]
+    /// The device that draws and its queue, for tests and measurements of what runs on it.
+    #[cfg(any(test, feature = "report"))]
     pub(crate) fn device(&self) -> Option<(&wgpu::Device, &wgpu::Queue)> {
         match &self.device {
             Device::Gpu(gpu) => Some(gpu.device()),
