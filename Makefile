@@ -1,5 +1,5 @@
 # Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
-.PHONY: demo test bench driver python
+.PHONY: demo test exhaustive bench driver python
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
@@ -16,6 +16,10 @@ demo:
 test: driver python
 	cargo test --locked --release
 
+# What takes minutes: all 2^32 words through the radius and the circle, and the statistics under 200 seeds.
+exhaustive:
+	cargo test --locked --release --lib --test statistics -- --ignored --nocapture
+
 # In-process and whole-process rates, beside NumPy and Numba.
 bench: driver python
 	cargo build --locked --release
@@ -26,9 +30,9 @@ bench: driver python
 driver:
 	@sh scripts/driver.sh
 
-# NumPy and SciPy, against which fits and files are tested.
+# NumPy, SciPy and the readers of every format, against which fits and files are tested.
 python: $(VENV)/ready
 
-$(VENV)/ready:
+$(VENV)/ready: scripts/python.sh
 	@sh scripts/python.sh $(VENV)
 	@touch $@

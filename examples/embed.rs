@@ -9,7 +9,7 @@ use spectroll::wgpu::{self, util::DeviceExt};
 use spectroll::{Layout, Model, Quantity, Recipe, Sampler, Stream, colorimetry};
 
 #[path = "host/mod.rs"]
-mod host;
+pub(crate) mod host;
 
 pub(crate) const COLUMNS: u32 = 32;
 pub(crate) const ROWS: u32 = 20;

@@ -130,6 +130,37 @@ def whole_process(rounds, model, count):
     memory.show("MB")
 
 
+FORMATS = {
+    ".npy": "out.npy", ".npz": "out.npz", ".zarr": "out.zarr", ".zarr --zstd": "out.zarr --zstd", ".h5": "out.h5",
+    ".mat": "out.mat", ".parquet": "out.parquet", "parts of .npy": "out/ --format npy",
+    "parts of .parquet": "out/ --format parquet",
+}
+
+
+def formats(rounds, count, engine, folder):
+    """Each format to disk, beside `dd` with the same number of bytes, both until they are on disk."""
+    rates, memory = Figures(), Figures()
+    size = count * 31 * 4
+    for _ in range(rounds):
+        path = os.path.join(folder, "dd")
+        seconds = run("dd", "if=/dev/zero", f"of={path}", "bs=4M", f"count={size >> 22}", "conv=fsync", "status=none")[1]
+        os.remove(path)
+        rates.add("dd", size / seconds / 1e6)
+        for name, output in FORMATS.items():
+            path, *flags = os.path.join(folder, output).split()
+            command = [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", path, "-q", "--engine", engine]
+            _, seconds, resident = run(*command, *flags)
+            rates.add(name, size / seconds / 1e6)
+            memory.add(name, resident)
+            shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
+    print(f"\nWhole process, {count:,} reflectances ({size / 1e9:.2f} GB of float32) to disk, --engine {engine}:")
+    rates.show("MB/s")
+    for name in (".npy", ".zarr"):
+        rates.ratio(name, "dd")
+    print("  peak resident memory:")
+    memory.show("MB")
+
+
 def latency(rounds, folder):
     seconds = Figures()
     out = os.path.join(folder, "one.npy")
@@ -150,6 +181,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=5, help="how often each program takes its turn")
     parser.add_argument("--count", type=int, default=8_000_000, help="spectra of a whole-process run")
+    parser.add_argument("--folder", help="where formats are written [default: the system's temporary folder]")
     arguments = parser.parse_args()
     print(f"{time.strftime('%Y-%m-%d')}, {os.cpu_count()} cores, {platform.machine()}, {platform.system()}\n")
     with tempfile.TemporaryDirectory() as folder:
@@ -157,6 +189,8 @@ def main():
         in_process(arguments.rounds, model)
         whole_process(arguments.rounds, model, arguments.count)
         latency(arguments.rounds, folder)
+        for engine in ("gpu", "cpu"):
+            formats(arguments.rounds, arguments.count, engine, arguments.folder or folder)
 
 
 if __name__ == "__main__":

@@ -1,21 +1,26 @@
-// Draw `index` of a stream: candidates until one is accepted, attempt by attempt. CPU twin: src/cpu.rs.
+// Draw `index` of a stream: candidates until one is accepted, attempt by attempt. CPU twin: src/cpu/mod.rs. A line
+// that ends in `if` and a word is there only for programs of which src/wgsl/mod.rs says it.
 
 struct Draw {
     z: Normals,
     // The candidates it took; 0 where none of `max_attempts` was accepted.
     attempts: u32,
-    // What multiplies its spectrum.
-    scale: f32,
+    // What multiplies its spectrum. // if scaled
+    scale: f32, // if scaled
 }
 
 // The loop ends by its condition and not by `break`: llvmpipe runs that form a quarter faster.
 fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, max_attempts: u32) -> Draw {
     var result: Draw;
     for (var attempt = 0u; attempt < max_attempts && result.attempts == 0u; attempt++) {
-        let z = normals(key, index, stream, attempt);
+        let z = normals(key, index, stream, attempt); // if plain
+        let accepted = is_accepted(z); // if plain
+        let c = candidate(key, index, stream, attempt); // if covered
+        let z = c.z; // if covered
+        let accepted = c.kept && is_accepted(z); // if covered
         result.z = z;
-        result.attempts = select(0u, attempt + 1u, is_accepted(z));
+        result.attempts = select(0u, attempt + 1u, accepted);
     }
-    result.scale = scale(result.z, key, index, stream);
+    result.scale = scale(result.z, key, index, stream); // if scaled
     return result;
 }

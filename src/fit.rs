@@ -84,9 +84,9 @@ impl Fit {
         if !centred.iter().chain(&mean).all(|v| v.is_finite()) {
             return Err(FitError::Scale);
         }
-        // Spectra that differ by no more than rounding do not differ.
+        // Spectra that differ by no more than rounding do not differ. A mean is as good as the sum that it comes from.
         let size = mean.amax().max(centred.amax());
-        let rounding = size * f64::EPSILON;
+        let rounding = size * f64::EPSILON * spectra as f64;
         if centred.amax() <= rounding {
             return Err(FitError::NoVariation { spectra });
         }

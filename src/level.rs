@@ -2,6 +2,8 @@
 //!
 //! As with the normals, the exponential in f32 is a polynomial of our own: the shader's twin, to the bit.
 
+use std::f32::consts::LN_2;
+
 use crate::normal::Real;
 use crate::program;
 
@@ -30,7 +32,7 @@ impl<R: Real> Level<R> {
     pub(crate) fn of(&self, word: u32) -> R {
         match self {
             Level::LogUniform { low, octaves } => *low * (R::uniform(word) * *octaves).exp2(),
-            Level::OneOf(values) => values[(u64::from(word) * values.len() as u64 >> 32) as usize],
+            Level::OneOf(values) => values[((u64::from(word) * values.len() as u64) >> 32) as usize],
         }
     }
 }
@@ -51,7 +53,7 @@ pub(crate) fn exp2(t: f32) -> f32 {
     p = p * r + 0.009617189;
     p = p * r + 0.055503115;
     p = p * r + 0.2402265;
-    p = p * r + 0.6931472;
+    p = p * r + LN_2;
     (1.0 + r * p) * f32::from_bits(((whole + 127) as u32) << 23)
 }
 

@@ -20,6 +20,9 @@ mod level;
 mod normal;
 mod philox;
 mod stream;
+mod truncated;
+
+mod cover;
 
 mod cpu;
 mod outputs;
@@ -34,6 +37,15 @@ mod engine;
 mod probe;
 
 pub mod output;
+pub mod provenance;
+
+#[cfg(feature = "report")]
+pub mod statistics;
+#[cfg(feature = "report")]
+pub mod stress;
+
+#[cfg(feature = "report")]
+pub mod report;
 
 pub mod scene;
 
@@ -46,7 +58,9 @@ pub use normal::Real;
 pub use philox::philox;
 pub use program::{Bounds, Tally};
 pub use quantity::{Element, Format, Layout, Quantity};
-pub use recipe::{DEFAULT_MAX_ATTEMPTS, Drawn, Intensity, Luminance, Recipe, RecipeBuilder, RecipeError};
+pub use recipe::{
+    DEFAULT_MAX_ATTEMPTS, Drawn, Intensity, Luminance, Proposal, Recipe, RecipeBuilder, RecipeError,
+};
 pub use sampler::{Prepared, Sampler, SamplerError};
 pub use stream::{Draws, Stream, StreamRng};
 pub use wgpu;

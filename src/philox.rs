@@ -38,7 +38,7 @@ fn wide(a: u32, b: u32) -> u64 {
 
 /// The known answers of the Random123 distribution (`kat_vectors`), counter, key and output: shared with the test of
 /// the shader.
-#[cfg(test)]
+#[cfg(any(test, feature = "report"))]
 pub(crate) const KNOWN_ANSWERS: [([u32; 4], [u32; 2], [u32; 4]); 3] = [
     ([0; 4], [0; 2], [0x6627_E8D5, 0xE169_C58D, 0xBC57_AC4C, 0x9B00_DBD8]),
     ([u32::MAX; 4], [u32::MAX; 2], [0x408F_276D, 0x41C8_3B0E, 0xA20B_C7C6, 0x6D54_51FD]),

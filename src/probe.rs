@@ -8,10 +8,23 @@ use crate::engine::{Choice, Engine};
 use crate::normal::{circle, radius};
 use crate::philox::{KNOWN_ANSWERS, philox};
 use crate::stream::Stream;
+use crate::truncated::truncated;
 use crate::wgsl::{Target, generator};
 
 /// What `body` writes to `output` for each `i`, on the best adapter.
 fn run(target: Target, body: &str, input: &[u32], output_words: usize) -> Option<Vec<u32>> {
+    run_with(target, "", &[], body, input, output_words)
+}
+
+/// The same with fragments of its own, and a buffer for them at binding 2 unless it would be empty.
+fn run_with(
+    target: Target,
+    fragments: &str,
+    table: &[u32],
+    body: &str,
+    input: &[u32],
+    output_words: usize,
+) -> Option<Vec<u32>> {
     let engine = Engine::new(&Choice::Gpu).expect("these tests need an adapter");
     let (device, queue) = engine.device().expect("the engine is a GPU's");
     if target != Target::Baseline && !device.features().contains(wgpu::Features::SHADER_INT64) {
@@ -19,6 +32,7 @@ fn run(target: Target, body: &str, input: &[u32], output_words: usize) -> Option
     }
     let text = format!(
         "{}
+{fragments}
 @group(0) @binding(0) var<storage, read> input: array<u32>;
 @group(0) @binding(1) var<storage, read_write> output: array<u32>;
 @compute @workgroup_size(64)
@@ -41,14 +55,16 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {{ let i = id.x; {body} }}
     let buffer = |usage| {
         device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
     };
-    let input = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: None,
-        contents: bytemuck::cast_slice(input),
-        usage: BufferUsages::STORAGE,
+    let [input, table] = [input, table].map(|words| {
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: None,
+            contents: bytemuck::cast_slice(words),
+            usage: BufferUsages::STORAGE,
+        })
     });
     let output = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
     let staging = buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
-    let entries = [&input, &output].into_iter().zip(0..);
+    let entries = [&input, &output, &table].into_iter().zip(0..).filter(|(buffer, _)| buffer.size() > 0);
     let entries: Vec<_> = entries
         .map(|(buffer, binding)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
         .collect();
@@ -129,4 +145,58 @@ fn radius_and_circle_are_those_of_their_twins() {
     // Near a zero of the sine or cosine a ULP is tiny, but the angle is exact there, so the bound holds.
     assert!(ulps(&bits("circle(input[i]).x"), words.iter().map(|&w| circle(w)[0])) <= allowed);
     assert!(ulps(&bits("circle(input[i]).y"), words.iter().map(|&w| circle(w)[1])) <= allowed);
+}
+
+/// Wide axes and narrow ones, near the mean and far from it, at many words each.
+#[test]
+fn truncated_normals_are_those_of_their_twin() {
+    let cover = crate::cover::tests::near_white();
+    let axes = &cover.proposal().rounded::<f32>().words();
+    let axes: Vec<_> = axes.iter().filter(|axis| axis[3] != 0).step_by(11).collect();
+    let words = words();
+    let cases: Vec<_> = words.iter().step_by(7).zip(axes.iter().cycle()).collect();
+    let input: Vec<u32> =
+        cases.iter().flat_map(|(word, axis)| std::iter::once(**word).chain(axis.iter().copied())).collect();
+    let fragments = include_str!("../shaders/truncated.wgsl");
+    let allowed = allowed_ulps();
+    for (element, name) in ["x", "y"].into_iter().enumerate() {
+        let body = format!(
+            "if i < arrayLength(&output) {{
+                let axis = bitcast<vec4<f32>>(vec4(input[5u*i+1u], input[5u*i+2u], input[5u*i+3u], input[5u*i+4u]));
+                output[i] = bitcast<u32>(truncated(axis, input[5u*i]).{name});
+            }}"
+        );
+        let found = run_with(Target::Baseline, fragments, &[], &body, &input, cases.len());
+        let expected = cases.iter().map(|(word, axis)| truncated(axis.map(f32::from_bits), **word)[element]);
+        assert!(ulps(&found.expect("every adapter runs the baseline"), expected) <= allowed);
+    }
+}
+
+/// Whole candidates: every coordinate, and whether thinning keeps them.
+#[test]
+fn candidates_of_a_cover_are_those_of_their_twin() {
+    const COUNT: u64 = 20_000;
+    let cover = crate::cover::tests::near_white();
+    let proposal = cover.proposal().rounded::<f32>();
+    let stream = Stream::new(0x0123_4567_89AB_CDEF);
+    let fields: Vec<_> = (0..6).map(|j| format!("z{j}: f32")).collect();
+    let fragments = format!("struct Normals {{ {} }}\n{}", fields.join(", "), proposal.text(6, 2));
+    let body = "if i < arrayLength(&output) / 7u {
+        let c = candidate(vec2(0x89ABCDEFu, 0x01234567u), vec2(i, 0u), 0u, 3u);
+        output[7u*i] = bitcast<u32>(c.z.z0); output[7u*i+1u] = bitcast<u32>(c.z.z1);
+        output[7u*i+2u] = bitcast<u32>(c.z.z2); output[7u*i+3u] = bitcast<u32>(c.z.z3);
+        output[7u*i+4u] = bitcast<u32>(c.z.z4); output[7u*i+5u] = bitcast<u32>(c.z.z5);
+        output[7u*i+6u] = bitcast<u32>(select(0f, 1f, c.kept)) + input[0];
+    }";
+    let words = proposal.words();
+    let found = run_with(Target::Baseline, &fragments, words.as_flattened(), body, &[0], 7 * COUNT as usize);
+    let mut expected = Vec::new();
+    for i in 0..COUNT {
+        let mut coordinates = [[0f32]; 6];
+        let [kept] = proposal.propose(&mut coordinates, |b| stream.block(i, 3, b).map(|w| [w]));
+        expected.extend(coordinates.as_flattened());
+        expected.push(f32::from(u8::from(kept)));
+    }
+    let found = found.expect("every adapter runs the baseline");
+    assert!(ulps(&found, expected.into_iter()) <= allowed_ulps());
 }

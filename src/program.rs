@@ -6,6 +6,7 @@
 //! scale in its gains. What is left of a draw is one rule that the spectrum must obey, and one factor that scales it.
 //! The shader and the CPU engine both work from this, and round it once.
 
+use crate::cover::{Cover, Proposal};
 use crate::dataset::Kind;
 use crate::model::Model;
 use crate::quantity::Format;
@@ -118,6 +119,8 @@ pub(crate) struct Program {
     pub(crate) spectrum: Affine,
     pub(crate) target: Option<Target>,
     pub(crate) level: Option<Level>,
+    /// What proposes candidates, where it is not plain rejection: z is then what it gives, and all maps are of that.
+    pub(crate) proposal: Option<Proposal<f64>>,
     /// How many candidates a draw may take, at least 1 and less than 2^31.
     pub(crate) max_attempts: u32,
     /// What comes out, in the order of [`Quantity`](crate::Quantity), each once.
@@ -137,6 +140,7 @@ impl Program {
             spectrum,
             target: None,
             level: None,
+            proposal: None,
             max_attempts: 1,
             outputs: Vec::new(),
         }
@@ -145,6 +149,21 @@ impl Program {
     /// The same with every spectrum multiplied by `intensity`.
     pub(crate) fn brightened(self, intensity: f64) -> Program {
         Program { spectrum: self.spectrum.scaled(intensity), ..self }
+    }
+
+    /// The same draws from the candidates of a cover.
+    pub(crate) fn covered(self, cover: &Cover) -> Program {
+        let frame = cover.frame();
+        let turned = |source| match source {
+            Source::Map(map, Unit::Over(over)) => {
+                Source::Map(frame.turned(&map), Unit::Over(frame.turned(&over)))
+            }
+            Source::Map(map, unit) => Source::Map(frame.turned(&map), unit),
+            other => other,
+        };
+        let outputs = self.outputs.into_iter().map(|o| Output { source: turned(o.source), ..o }).collect();
+        let spectrum = frame.turned(&self.spectrum);
+        Program { spectrum, outputs, proposal: Some(cover.proposal().clone()), ..self }
     }
 
     /// The same with tallies among what comes out.

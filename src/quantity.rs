@@ -72,16 +72,42 @@ pub enum Layout {
 
 /// The type of a value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
 pub enum Element {
-    /// 32 bits, floating.
-    #[default]
-    F32,
-    /// 16 bits, floating: 11 significant bits, nothing above 65,504. Two make a word of a shader, the first its low
+    /// IEEE half precision: 11 significant bits, nothing above 65,504. Two make a word of a shader, the first its low
     /// half.
+    #[serde(rename = "float16")]
     F16,
-    /// 32 bits, unsigned.
+    /// IEEE single precision.
+    #[default]
+    #[serde(rename = "float32")]
+    F32,
+    /// IEEE double precision: of files, not of draws.
+    #[serde(rename = "float64")]
+    F64,
+    /// An unsigned integer of 32 bits.
+    #[serde(rename = "uint32")]
     U32,
+}
+
+impl Element {
+    /// Its size in bytes.
+    pub fn size(self) -> usize {
+        match self {
+            Element::F16 => 2,
+            Element::F32 | Element::U32 => 4,
+            Element::F64 => 8,
+        }
+    }
+
+    /// What NumPy, Zarr and xarray call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Element::F16 => "float16",
+            Element::F32 => "float32",
+            Element::F64 => "float64",
+            Element::U32 => "uint32",
+        }
+    }
 }
 
 /// How a quantity lies in its array.
@@ -130,17 +156,9 @@ impl Format {
         }
     }
 
-    /// How many bytes a value has.
-    pub fn element_bytes(&self) -> usize {
-        match self.element {
-            Element::F16 => 2,
-            Element::F32 | Element::U32 => 4,
-        }
-    }
-
     /// How many bytes the array of `draws` draws has.
     pub fn bytes(&self, draws: u64) -> u64 {
-        self.values(draws) * self.element_bytes() as u64
+        self.values(draws) * self.element.size() as u64
     }
 }
 

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::colorimetry;
 use crate::condition::Condition;
+use crate::cover::{Cover, Estimate};
 use crate::cpu::Kernel;
 use crate::dataset::Kind;
 use crate::grid::Grid;
@@ -15,7 +16,7 @@ use crate::normal::Real;
 use crate::outputs::{Asked, outputs};
 use crate::program::{self, Affine, Bounds, Level, Program, Tally, Target};
 use crate::quantity::{Element, Format, Layout, Quantity};
-use crate::region;
+use crate::region::{self, Room};
 use crate::stream::Stream;
 use crate::wgsl::{self, TextError};
 
@@ -34,7 +35,22 @@ const TOLERABLE_FAILURE: f64 = 1e-12;
 pub struct Recipe {
     model: Model,
     program: Program,
+    probability: f64,
     acceptance: f64,
+    /// How many boxes candidates are proposed from, and how many bytes their table has; `None` of plain rejection.
+    cover: Option<(usize, usize)>,
+}
+
+/// Where candidates come from. The draws have the same distribution either way, but are not the same draws.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Proposal {
+    /// Whatever is expected to cost less.
+    #[default]
+    Auto,
+    /// The model's Gaussian, as in the appendix: right where a good part of it is acceptable.
+    Plain,
+    /// Boxes that cover what is acceptable, for models of up to 12 components: right where next to nothing is.
+    Cover,
 }
 
 /// A recipe under construction.
@@ -46,6 +62,7 @@ pub struct RecipeBuilder {
     bounds: Bounds,
     covariance_scale: f64,
     intensity: Option<Intensity>,
+    proposal: Proposal,
     max_attempts: u32,
     outputs: Asked,
 }
@@ -78,7 +95,7 @@ pub enum Luminance {
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum RecipeError {
     #[error(
-        "a target luminous reflectance of {0}: it must be above 0 and below 1, where 1 is a perfect white"
+        "a target luminous reflectance of {0}: it must be above 0 and below 1, where 1 is a perfect white, and 1e-30 at least"
     )]
     Lrv(f64),
     #[error("a target luminous reflectance belongs to reflectances, and this model is of illuminants")]
@@ -133,6 +150,10 @@ pub enum RecipeError {
         nanometres(wavelengths)
     )]
     Empty { wavelengths: Vec<f64> },
+    #[error(
+        "what is acceptable cannot be covered: covers are for models of up to 12 components, and this one has {components}"
+    )]
+    NoCover { components: usize },
     #[error("too few candidates would be accepted: {}", hopeless(*acceptance, *max_attempts))]
     Hopeless { acceptance: f64, max_attempts: u32 },
 }
@@ -157,6 +178,7 @@ impl Recipe {
             bounds: Bounds::default(),
             covariance_scale: 1.0,
             intensity: None,
+            proposal: Proposal::default(),
             max_attempts: DEFAULT_MAX_ATTEMPTS,
             outputs: Asked::default(),
         }
@@ -170,6 +192,22 @@ impl Recipe {
     /// The share of candidates that are accepted, estimated from 65,536 of them.
     pub fn acceptance(&self) -> f64 {
         self.acceptance
+    }
+
+    /// The probability that a spectrum of the model obeys the rule, which is the share that plain rejection accepts;
+    /// estimated from as many candidates.
+    pub fn probability(&self) -> f64 {
+        self.probability
+    }
+
+    /// Where candidates come from; never [`Proposal::Auto`].
+    pub fn proposal(&self) -> Proposal {
+        if self.cover.is_some() { Proposal::Cover } else { Proposal::Plain }
+    }
+
+    /// How many boxes candidates are proposed from, and how many bytes their table has, where there is a cover.
+    pub fn cover(&self) -> Option<(usize, usize)> {
+        self.cover
     }
 
     /// What comes out, and how it lies in memory, in the order of [`Quantity`].
@@ -306,6 +344,11 @@ impl RecipeBuilder {
         RecipeBuilder { covariance_scale, ..self }
     }
 
+    /// Where candidates come from ([`Proposal::Auto`]).
+    pub fn proposal(self, proposal: Proposal) -> Self {
+        RecipeBuilder { proposal, ..self }
+    }
+
     /// How many candidates a draw may take ([`DEFAULT_MAX_ATTEMPTS`]).
     pub fn max_attempts(self, max_attempts: u32) -> Self {
         RecipeBuilder { max_attempts, ..self }
@@ -340,18 +383,50 @@ impl RecipeBuilder {
                 return Err(RecipeError::UnreachableLrv { lrv: target.lrv, largest });
             }
         }
-        if let Some(bands) = region::blocking_bands(&program) {
-            if let Some(xyz) = self.xyz {
-                return Err(RecipeError::UnreachableXyz { xyz, nearest: self.nearest(xyz) });
+        let half_spaces = region::half_spaces(&program);
+        let within = match region::room(&half_spaces) {
+            Room::None { bands } => {
+                if let Some(xyz) = self.xyz {
+                    return Err(RecipeError::UnreachableXyz { xyz, nearest: self.nearest(xyz) });
+                }
+                let wavelengths = bands.into_iter().map(|band| self.model.grid().wavelength(band)).collect();
+                return Err(RecipeError::Empty { wavelengths });
             }
-            let wavelengths = bands.into_iter().map(|band| self.model.grid().wavelength(band)).collect();
-            return Err(RecipeError::Empty { wavelengths });
+            Room::Ball { centre, .. } => Some(centre),
+            Room::Unknown => None, // which the pilot run will tell
+        };
+        let plain = match self.proposal {
+            Proposal::Cover => 0.0,
+            Proposal::Auto | Proposal::Plain => pilot(&program),
+        };
+        let cover = match within {
+            Some(within) if self.proposal == Proposal::Cover || self.may_cover(plain) => {
+                Cover::new(&half_spaces, &within)
+            }
+            _ => None,
+        };
+        let estimate = cover.as_ref().map(|cover| cover.estimate(Stream::named(0, "pilot"), PILOT));
+        let covered = cover.zip(estimate).filter(|(_, estimate)| Cover::pays(estimate.acceptance, plain));
+        if self.proposal == Proposal::Cover && covered.is_none() {
+            return Err(RecipeError::NoCover { components: program.components() });
         }
-        let acceptance = pilot(&program);
-        if failure(acceptance, self.max_attempts) > TOLERABLE_FAILURE {
+        let mut recipe =
+            Recipe { model: self.model, program, probability: plain, acceptance: plain, cover: None };
+        if let Some((cover, Estimate { acceptance, probability, .. })) = covered {
+            recipe.program = recipe.program.covered(&cover);
+            recipe.cover = Some((cover.len(), cover.proposal().bytes()));
+            (recipe.probability, recipe.acceptance) = (probability, acceptance);
+        }
+        if failure(recipe.acceptance, self.max_attempts) > TOLERABLE_FAILURE {
+            let acceptance = recipe.acceptance;
             return Err(RecipeError::Hopeless { acceptance, max_attempts: self.max_attempts });
         }
-        Ok(Recipe { model: self.model, program, acceptance })
+        Ok(recipe)
+    }
+
+    /// Whether a cover is to be tried.
+    fn may_cover(&self, plain: f64) -> bool {
+        self.proposal == Proposal::Auto && Cover::could_pay(plain)
     }
 
     /// What giving the tristimulus values does to this model.
@@ -391,7 +466,7 @@ impl RecipeBuilder {
         let condition = self.condition(&weights).ok()?;
         rounded.into_iter().find(|&xyz| {
             let program = Program::new(&self.model, &condition.given(xyz, &weights));
-            region::blocking_bands(&program).is_none()
+            !matches!(region::room(&region::half_spaces(&program)), Room::None { .. })
                 && failure(pilot(&program), self.max_attempts) <= TOLERABLE_FAILURE
         })
     }
@@ -422,7 +497,8 @@ impl RecipeBuilder {
     }
 
     fn target(&self, lrv: f64) -> Result<Target, RecipeError> {
-        if !(lrv > 0.0 && lrv < 1.0) {
+        // Far below, spectra would round to 0; just below 1, to 1.
+        if !(1e-30..1.0).contains(&f64::from(lrv as f32)) {
             return Err(RecipeError::Lrv(lrv));
         }
         if self.model.kind() == Kind::Illuminant {
@@ -434,17 +510,26 @@ impl RecipeBuilder {
     }
 }
 
-/// Numbers must survive rounding to f32, with room for sums and for a scale of 10^6 either way.
+/// Numbers must survive rounding to f32, with room for sums and for a scale of 10^6 either way; where there is a
+/// target, so must the LRV of dark candidates, by which all are divided. No band may be below f32's normal range, which
+/// adapters may flush to 0.
 fn check_scale(program: &Program) -> Result<(), RecipeError> {
-    let largest = |values: &[f64]| values.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
     let Affine { offset, gain } = &program.spectrum;
-    let largest = gain.iter().map(|gain| largest(gain)).fold(largest(offset), f64::max);
-    if (1e-30..1e30).contains(&largest) { Ok(()) } else { Err(RecipeError::Scale(largest)) }
+    let size = |b: usize| gain.iter().fold(offset[b].abs(), |a, gain| a.max(gain[b].abs()));
+    let sizes = || (0..program.bands()).map(size);
+    let (least, largest) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
+    let low = if program.target.is_some() { 1e-20 } else { 1e-30 };
+    if !(low..1e30).contains(&largest) {
+        return Err(RecipeError::Scale(largest));
+    }
+    let is_lost = least > 0.0 && least < f64::from(f32::MIN_POSITIVE);
+    if is_lost { Err(RecipeError::Scale(least)) } else { Ok(()) }
 }
 
-/// The share of accepted candidates, of a stream of its own.
+/// The share of accepted candidates, of a stream of its own. In f32, as draws are made: what passes in f64 may have no
+/// room there.
 fn pilot(program: &Program) -> f64 {
-    let kernel = Kernel::<f64>::new(program);
+    let kernel = Kernel::<f32>::new(program);
     let stream = Stream::named(0, "pilot");
     let accepted = (0..PILOT).into_par_iter().filter(|&index| kernel.accepts(|b| stream.block(index, 0, b)));
     accepted.count() as f64 / PILOT as f64
@@ -525,8 +610,8 @@ mod tests {
             (surface.clone().covariance_scale(f64::NAN), "finite and not negative"),
             (surface.clone().max_attempts(0), "at least 1 attempt"),
             (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
-            (surface.clone().covariance_scale(1e6), "none of 65536 was"),
-            (surface.clone().covariance_scale(100.0).max_attempts(1000), "allow at least"),
+            (surface.clone().covariance_scale(1e6).proposal(Proposal::Plain), "none of 65536 was"),
+            (surface.clone().covariance_scale(100.0).max_attempts(50), "allow at least"),
             (light.clone().lrv(0.5), "of illuminants"),
             (light.clone().xyz([0.3; 3]), "of illuminants"),
             (surface.clone().xyz([0.3, 1.0, 0.3]), "Y above 0 and below 1"),
@@ -538,7 +623,7 @@ mod tests {
             assert!(text.contains(part), "{text}");
         }
         // What the message advises is enough.
-        let advised = message(surface.clone().covariance_scale(100.0).max_attempts(1000));
+        let advised = message(surface.clone().covariance_scale(100.0).max_attempts(50));
         let attempts =
             advised.split("allow at least ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!(surface.covariance_scale(100.0).max_attempts(attempts).build().is_ok());

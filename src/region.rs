@@ -2,7 +2,8 @@
 //!
 //! Every rule is linear in the standard normals z, so what is accepted is a polytope, and a small linear program
 //! answers exactly what a pilot run could only suspect. Points beyond [`REACH`] standard deviations are left out:
-//! their mass is below 1e-37 a component.
+//! their mass is below 1e-37 a component. The room is the radius of the largest ball of acceptable z, in standard
+//! deviations: a set without volume is empty.
 
 use microlp::{ComparisonOp, OptimizationDirection, Problem, Variable};
 
@@ -10,45 +11,84 @@ use crate::dataset::Kind;
 use crate::program::{Affine, Bounds, Program};
 
 /// How far from the mean a draw may lie, in standard deviations of each component.
-const REACH: f64 = 13.0;
+pub(crate) const REACH: f64 = 13.0;
 
 /// Coefficients of unit rows below this are dropped: together they move no bound by 1e-7, the solver's tolerance.
 const NEGLIGIBLE: f64 = 1e-12;
 
-/// The bands that leave no room, as indices, where no z is acceptable.
-///
-/// The room is the radius of the largest ball of acceptable z, in standard deviations: a set without volume is empty.
-pub(crate) fn blocking_bands(program: &Program) -> Option<Vec<usize>> {
-    let rows = rows(program);
-    let impossible: Vec<_> = rows.iter().filter(|r| r.norm == 0.0 && r.room <= 0.0).map(|r| r.band).collect();
-    if !impossible.is_empty() {
-        return Some(distinct(impossible));
+/// What room a set of half-spaces leaves.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Room {
+    /// The largest ball within all of them, in standard deviations.
+    Ball { centre: Vec<f64>, radius: f64 },
+    /// None: the set is empty or has no volume, because of the bounds at these bands, as indices.
+    None { bands: Vec<usize> },
+    /// The linear program's solver found no answer.
+    Unknown,
+}
+
+/// One bound of one band: what is accepted has normal . z < room.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct HalfSpace {
+    pub(crate) band: usize,
+    /// Of length 1, or 0 where no z changes what is bounded.
+    pub(crate) normal: Vec<f64>,
+    /// In standard deviations, unless the normal is 0.
+    pub(crate) room: f64,
+}
+
+impl HalfSpace {
+    fn new(band: usize, coefficients: Vec<f64>, room: f64) -> HalfSpace {
+        let norm = coefficients.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let length = if norm > 0.0 { norm } else { 1.0 };
+        let normal = coefficients.into_iter().map(|c| c / length).collect();
+        HalfSpace { band, normal, room: room / length }
     }
-    let k = program.components();
-    let reach = REACH * (k as f64).sqrt() + 1.0;
-    let binding: Vec<_> = rows.iter().filter(|r| r.norm > 0.0 && r.room / r.norm < reach).collect();
+
+    /// Whether all points or none obey it.
+    fn is_constant(&self) -> bool {
+        self.normal.iter().all(|&c| c == 0.0)
+    }
+
+    /// Whether it cuts something off the points within [`REACH`].
+    pub(crate) fn cuts(&self) -> bool {
+        let corner = REACH * (self.normal.len() as f64).sqrt();
+        !self.is_constant() && self.room < corner + 1.0
+    }
+}
+
+/// The room that half-spaces leave.
+pub(crate) fn room(half_spaces: &[HalfSpace]) -> Room {
+    let impossible = half_spaces.iter().filter(|h| h.is_constant() && h.room <= 0.0);
+    let bands = distinct(impossible.map(|h| h.band).collect());
+    if !bands.is_empty() {
+        return Room::None { bands };
+    }
+    let k = half_spaces.first().map_or(0, |h| h.normal.len());
+    let cuts: Vec<_> = half_spaces.iter().filter(|h| h.cuts()).collect();
 
     let mut problem = Problem::new(OptimizationDirection::Maximize);
     let z: Vec<Variable> = (0..k).map(|_| problem.add_var(0.0, (-REACH, REACH))).collect();
     let radius = problem.add_var(1.0, (-1e6, 1.0));
-    for row in &binding {
-        let unit = row.coefficients.iter().map(|c| c / row.norm);
-        let mut terms: Vec<_> = z.iter().copied().zip(unit).filter(|(_, c)| c.abs() > NEGLIGIBLE).collect();
+    for cut in &cuts {
+        let terms = z.iter().copied().zip(cut.normal.iter().copied());
+        let mut terms: Vec<_> = terms.filter(|(_, c)| c.abs() > NEGLIGIBLE).collect();
         terms.push((radius, 1.0));
-        problem.add_constraint(&terms, ComparisonOp::Le, row.room / row.norm);
+        problem.add_constraint(&terms, ComparisonOp::Le, cut.room);
     }
-    // What the solver cannot answer is left to the pilot run, which can.
-    let solution = problem.solve().ok()?.into_solution().ok()?;
+    let Some(solution) = problem.solve().ok().and_then(|outcome| outcome.into_solution().ok()) else {
+        return Room::Unknown;
+    };
+    let centre: Vec<f64> = z.iter().map(|&z| solution.var_value(z)).collect();
     let largest = solution.var_value(radius);
     if largest > 1e-7 {
-        return None;
+        return Room::Ball { centre, radius: largest };
     }
-    let tight = binding.iter().filter(|row| {
-        let value: f64 =
-            row.coefficients.iter().zip(&z).map(|(c, &z)| c / row.norm * solution.var_value(z)).sum();
-        value + largest > row.room / row.norm - 1e-5
+    let tight = cuts.iter().filter(|cut| {
+        let value: f64 = cut.normal.iter().zip(&centre).map(|(c, z)| c * z).sum();
+        value + largest > cut.room - 1e-5
     });
-    Some(distinct(tight.map(|row| row.band).collect()))
+    Room::None { bands: distinct(tight.map(|cut| cut.band).collect()) }
 }
 
 /// The largest luminous reflectance at which some spectrum of the model's shapes is still at most 1 everywhere.
@@ -83,8 +123,8 @@ pub(crate) fn nearest_xyz(program: &Program, xyz: &Affine, target: [f64; 3]) -> 
     let terms = |coefficients: &[f64]| -> Vec<_> {
         z.iter().copied().zip(coefficients.iter().copied()).filter(|(_, c)| c.abs() > NEGLIGIBLE).collect()
     };
-    for row in rows(program) {
-        problem.add_constraint(terms(&row.coefficients), ComparisonOp::Le, row.room);
+    for bound in half_spaces(program) {
+        problem.add_constraint(terms(&bound.normal), ComparisonOp::Le, bound.room);
     }
     for (axis, target) in target.into_iter().enumerate() {
         let value = xyz.value(axis);
@@ -104,21 +144,11 @@ pub(crate) fn nearest_xyz(program: &Program, xyz: &Affine, target: [f64; 3]) -> 
     )
 }
 
-/// One half-space: coefficients . z < room.
-struct Row {
-    band: usize,
-    coefficients: Vec<f64>,
-    norm: f64,
-    room: f64,
-}
-
-fn rows(program: &Program) -> Vec<Row> {
+/// The bounds that a program's rule sets.
+pub(crate) fn half_spaces(program: &Program) -> Vec<HalfSpace> {
     let gains = |band: usize| program.spectrum.gain.iter().map(move |gain| gain[band]);
-    let mut rows = Vec::new();
-    let mut push = |band, coefficients: Vec<f64>, room| {
-        let norm = coefficients.iter().map(|c| c * c).sum::<f64>().sqrt();
-        rows.push(Row { band, coefficients, norm, room });
-    };
+    let mut half_spaces = Vec::new();
+    let mut push = |band, coefficients, room| half_spaces.push(HalfSpace::new(band, coefficients, room));
     for band in 0..program.bands() {
         push(band, gains(band).map(|g| -g).collect(), program.spectrum.offset[band]); // s > 0
         if program.kind == Kind::Reflectance && program.tests_base() {
@@ -136,7 +166,7 @@ fn rows(program: &Program) -> Vec<Row> {
             push(band, coefficients, lrv_offset - target.lrv * program.spectrum.offset[band]);
         }
     }
-    rows
+    half_spaces
 }
 
 fn distinct(mut bands: Vec<usize>) -> Vec<usize> {
@@ -148,6 +178,15 @@ fn distinct(mut bands: Vec<usize>) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The bands that leave no room, where no z is acceptable.
+    fn blocking_bands(program: &Program) -> Option<Vec<usize>> {
+        match room(&half_spaces(program)) {
+            Room::None { bands } => Some(bands),
+            Room::Ball { .. } => None,
+            Room::Unknown => panic!("the solver found no answer"),
+        }
+    }
     use crate::colorimetry::lrv_weights;
     use crate::model::Model;
     use crate::program::{self, Target};
@@ -165,6 +204,7 @@ mod tests {
             spectrum: Affine { offset, gain: vec![shape] },
             target: None,
             level: None,
+            proposal: None,
             max_attempts: 1,
             outputs: Vec::new(),
         }

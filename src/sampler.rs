@@ -8,7 +8,7 @@ use crate::program::Program;
 use crate::quantity::{Format, Quantity};
 use crate::recipe::Recipe;
 use crate::stream::Draws;
-use crate::wgsl::{self, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Target};
+use crate::wgsl::{self, COVER_AT, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Target};
 
 /// A recipe's compute pipeline on a wgpu device, to be recorded into its host's command encoders.
 ///
@@ -35,6 +35,8 @@ pub struct Sampler {
     pipeline: wgpu::ComputePipeline,
     /// The numbers that the shader reads from a buffer, where it does.
     tables: Option<wgpu::Buffer>,
+    /// The boxes that candidates are proposed from, where they are.
+    cover: Option<wgpu::Buffer>,
     /// What comes out.
     formats: Vec<Format>,
     max_attempts: u32,
@@ -81,7 +83,8 @@ impl Sampler {
     pub(crate) fn of(device: &Device, program: &Program) -> Result<Sampler, SamplerError> {
         let target = target(device);
         let (text, tables) = wgsl::shader(program, target);
-        let buffers = program.outputs.len() as u32 + u32::from(!tables.values.is_empty());
+        let others = [!tables.values.is_empty(), program.proposal.is_some()];
+        let buffers = (program.outputs.len() + others.into_iter().filter(|&there| there).count()) as u32;
         let largest = device.limits().max_storage_buffers_per_shader_stage;
         if buffers > largest {
             return Err(SamplerError::TooManyBuffers { buffers, largest });
@@ -102,9 +105,14 @@ impl Sampler {
             let bytes = bytemuck::cast_slice(&tables.values);
             filled_buffer(device, "spectroll tables", BufferUsages::STORAGE, bytes)
         });
+        let cover = program.proposal.as_ref().map(|proposal| {
+            let words = proposal.rounded::<f32>().words();
+            filled_buffer(device, "spectroll cover", BufferUsages::STORAGE, bytemuck::cast_slice(&words))
+        });
         Ok(Sampler {
             pipeline,
             tables,
+            cover,
             formats: program.outputs.iter().map(|output| output.format).collect(),
             max_attempts: program.max_attempts,
             draws_per_thread: wgsl::draws_per_thread(program, target),
@@ -174,6 +182,7 @@ impl Sampler {
         let at = |format: &Format| OUTPUTS_AT + format.quantity as u32;
         let entries: Vec<_> = std::iter::once((PARAMETERS_AT, &parameters))
             .chain(self.tables.iter().map(|tables| (TABLES_AT, tables)))
+            .chain(self.cover.iter().map(|cover| (COVER_AT, cover)))
             .chain(self.formats.iter().map(at).zip(&outputs))
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();

@@ -1,50 +1,12 @@
 //! The program as a person meets it: what it prints, what it leaves on disk, and how it exits.
 
+mod program;
+
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-use npyz::NpyFile;
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_spectroll");
-
-fn spectroll(folder: &Path, arguments: &str) -> Output {
-    Command::new(PROGRAM).args(arguments.split_whitespace()).current_dir(folder).output().unwrap()
-}
-
-/// Standard output and error of a run that succeeds.
-fn succeeds(folder: &Path, arguments: &str) -> (String, String) {
-    let output = spectroll(folder, arguments);
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    let (out, err) = (text(output.stdout), text(output.stderr));
-    assert!(output.status.success(), "{arguments}: {err}");
-    (out, err)
-}
-
-/// A run that fails with this exit code and says this, and leaves no new file.
-fn fails(folder: &Path, arguments: &str, code: i32, message: &str) {
-    let before = files(folder);
-    let output = spectroll(folder, arguments);
-    let err = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(code), "{arguments}: {err}");
-    assert!(err.contains(message), "{arguments}: {err}");
-    assert!(!err.contains("panicked"), "{arguments}: {err}");
-    assert_eq!(files(folder), before, "{arguments} left something behind");
-}
-
-fn files(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
-
-fn npy(path: &Path) -> (Vec<u64>, Vec<f32>) {
-    let bytes = fs::read(path).unwrap();
-    let file = NpyFile::new(bytes.as_slice()).unwrap();
-    (file.shape().to_vec(), file.into_vec().unwrap())
-}
+use program::{PROGRAM, fails, files, npy, succeeds};
 
 #[test]
 fn a_sample_is_the_same_from_every_engine_and_in_every_format() {
@@ -75,20 +37,6 @@ fn a_sample_is_the_same_from_every_engine_and_in_every_format() {
     );
     assert_eq!(npy(&path("part.npy")).1, values[600 * 31..]);
     assert_eq!(files(folder.path()), ["cpu.csv", "cpu.npy", "gpu.npy", "part.npy"]);
-}
-
-/// SPECTROLL_PYTHON names a Python that has NumPy; `make test` makes one.
-#[test]
-fn numpy_reads_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    succeeds(folder.path(), "sample granada -n 1000 --engine cpu -o a.npy");
-    let (_, values) = npy(&folder.path().join("a.npy"));
-    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let code = "import numpy as np; a = np.load('a.npy'); \
-                print(a.shape, a.dtype, a.flags['C_CONTIGUOUS'], repr(float(a[999, 30])))";
-    let output = Command::new(python).args(["-c", code]).current_dir(folder.path()).output().unwrap();
-    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert_eq!(out.trim(), format!("(1000, 31) float32 True {}", f64::from(values[30_999])), "{err}");
 }
 
 #[test]
@@ -127,7 +75,7 @@ fn impossible_and_hopeless_requests_are_refused() {
         ("munsell-vrhel -n 5 --lrv -1", 2, "reflectance of -1"),
         ("munsell-vrhel -n 5 --lrv NaN", 2, "reflectance of NaN"),
         ("munsell-vrhel -n 5 --lrv 0.9999", 2, "the largest is 0.995928"),
-        ("munsell-vrhel -n 5 --lrv 0.99 --bounds scaled", 2, "none of 65536 was"),
+        ("munsell-vrhel -n 5 --lrv 0.99 --bounds scaled --max-attempts 20", 2, "allow at least"),
         ("munsell-vrhel -n 5 --cov-scale -2", 2, "scale of -2: it must be finite and not negative"),
         ("munsell-vrhel -n 5 --cov-scale inf", 2, "scale of inf"),
         ("munsell-vrhel -n 5 --cov-scale 100 --max-attempts 50", 2, "allow at least"),
@@ -154,7 +102,7 @@ fn what_is_in_the_way_of_a_file_stays() {
     fails(folder.path(), "sample granada -n 5 -o old.npy", 1, "exists already");
     fails(folder.path(), "sample granada -n 5 -o folder.npy", 1, "is a folder");
     fails(folder.path(), "sample granada -n 5 -o no/such/x.npy", 1, "create it first");
-    fails(folder.path(), "sample granada -n 5 -o x.xlsx", 1, "name it .npy or .csv");
+    fails(folder.path(), "sample granada -n 5 -o x.xlsx", 1, "name it .npy, .npz, .csv");
     fails(folder.path(), "sample granada -n 5 -o - --json", 2, "both write to standard output");
     fails(folder.path(), "sample granada -n 5 --force --format npy -o /dev/null", 1, "not a plain file");
     assert_eq!(fs::read_to_string(folder.path().join("old.npy")).unwrap(), "mine");
@@ -190,12 +138,45 @@ fn a_model_is_fitted_and_drawn_from() {
 }
 
 /// Ctrl-C in the middle of a large file: exit code 130, soon, and nothing left behind.
+/// The page needs nothing else, and the numbers are all there.
+#[test]
+fn a_report_is_a_folder_that_appears_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("mine")).unwrap();
+    fails(folder.path(), "report -o mine --quick", 1, "exists already");
+    fails(folder.path(), "report -o mine --quick --force", 1, "not a report");
+    fails(folder.path(), "report -o x --quick --full", 2, "cannot be used with");
+    fails(folder.path(), "report -o no/such --quick", 1, "cannot write into");
+    fails(folder.path(), "report nonesuch -o x --quick", 2, "neither a file nor a built-in model");
+
+    let (out, _) = succeeds(folder.path(), "report granada -o x --quick --engine cpu --seed 5");
+    assert!(out.contains("36 of 36 stiff and extreme cases"), "{out}");
+    assert_eq!(files(folder.path()), ["mine", "x"]);
+    let x = folder.path().join("x");
+    let page = fs::read_to_string(x.join("report.html")).unwrap();
+    let svgs = files(&x).iter().filter(|name| name.ends_with(".svg")).count();
+    assert_eq!(page.matches("<svg").count(), svgs);
+    let loads = ["src=", "href=", "@import", "url("];
+    assert!(loads.iter().all(|load| !page.contains(load)), "the page loads something");
+    for figure in page.split("<figcaption>").skip(1) {
+        assert!(figure.contains("Seed 5.") && figure.contains(" UTC."), "{figure}");
+    }
+    let text = fs::read_to_string(x.join("report.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&json["seed"], &json["effort"]), (&5.into(), &"quick".into()));
+    assert!(json["models"][0]["convergence"]["points"].as_array().unwrap().len() >= 8);
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    for engine in ["gpu", "cpu"] {
-        let arguments = ["sample", "munsell-vrhel", "-n", "1e9", "-o", "big.npy", "--engine", engine];
+    for arguments in [
+        "sample munsell-vrhel -n 1e9 -o big.npy --engine gpu",
+        "sample munsell-vrhel -n 1e9 -o big.npy --engine cpu",
+        "report munsell-vrhel -o folder --engine cpu",
+    ] {
+        let arguments = arguments.split_whitespace();
         let mut child = Command::new(PROGRAM).args(arguments).current_dir(folder.path()).spawn().unwrap();
         let start = Instant::now();
         while files(folder.path()).is_empty() {
@@ -231,4 +212,56 @@ fn adapters_and_bench_speak_both_languages() {
     assert!(serde_json::from_str::<serde_json::Value>(&json).unwrap()[0]["name"].is_string());
     let (json, _) = succeeds(folder.path(), "bench granada --engine cpu --runs 5 --json");
     assert!(serde_json::from_str::<serde_json::Value>(&json).unwrap()[0]["median"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn a_file_may_hold_the_flags() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name| folder.path().join(name);
+    let config = "model = \"munsell-vrhel\"\ncount = 100\nseed = 4\nlrv = 0.4\nengine = \"cpu\"\nquiet = true\nforce = false";
+    fs::write(path("c.toml"), config).unwrap();
+    let plain = "sample munsell-vrhel -n 100 --lrv 0.4 --engine cpu";
+    for (arguments, same) in [
+        ("sample --config c.toml -o a.npy", format!("{plain} --seed 4 -o b.npy")),
+        ("sample --config c.toml --seed 9 -o a.npy", format!("{plain} --seed 9 -o b.npy")),
+        (
+            "sample --config c.toml granada-5nm -n 7 --lrv 0.2 -o a.npy",
+            "sample granada -n 1 -o b.npy".to_owned(),
+        ),
+    ] {
+        if arguments.contains("granada") {
+            // The flags win: here they ask for what cannot be.
+            fails(folder.path(), arguments, 2, "this model is of illuminants");
+            continue;
+        }
+        let (_, err) = succeeds(folder.path(), arguments);
+        assert_eq!(err, "");
+        succeeds(folder.path(), &same);
+        assert_eq!(fs::read(path("a.npy")).unwrap(), fs::read(path("b.npy")).unwrap(), "{arguments}");
+        fs::remove_file(path("a.npy")).unwrap();
+        fs::remove_file(path("b.npy")).unwrap();
+    }
+    // One way to name what draws wins over the other.
+    fails(folder.path(), "sample --config c.toml --adapter nonesuch -o a.npy", 3, "no adapter");
+    for (config, message) in [
+        ("sed = 4", "`spectroll sample` has no flag \"sed\""),
+        ("seed = [", "cannot use the configuration"),
+        ("quiet = 3", "quiet: expected true or false"),
+        ("seed = 2020-01-01", "cannot be a flag"),
+    ] {
+        fs::write(path("c.toml"), config).unwrap();
+        fails(folder.path(), "sample granada -n 1 --config c.toml -o a.npy", 2, message);
+    }
+    fails(folder.path(), "sample granada -n 1 --config d.toml -o a.npy", 2, "cannot use the configuration");
+}
+
+#[test]
+fn packagers_get_completions_and_pages() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(succeeds(folder.path(), &format!("completions {shell}")).0.contains("spectroll"), "{shell}");
+    }
+    assert!(succeeds(folder.path(), "man").0.contains(".TH spectroll 1"));
+    succeeds(folder.path(), "man pages");
+    assert!(files(&folder.path().join("pages")).contains(&"spectroll-sample.1".to_owned()));
 }

@@ -7,10 +7,9 @@ use spectroll::{
 
 #[path = "../examples/embed.rs"]
 mod embed;
-#[path = "../examples/host/mod.rs"]
-mod host;
 #[path = "../examples/inline.rs"]
 mod inline;
+use embed::host;
 
 fn surfaces() -> Recipe {
     let model = Model::builtin("munsell-vrhel").expect("it is built in");

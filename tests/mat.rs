@@ -170,8 +170,11 @@ fn values_and_places_of_bad_data() {
 
 #[test]
 fn other_versions_say_what_they_are() {
-    let v73 = [b"MATLAB 7.3 MAT-file".as_slice(), &[b' '; 600]].concat();
-    assert!(message(&v73, None).contains("version 7.3") && message(&v73, None).contains("save(file, '-v7')"));
+    #[cfg(feature = "hdf5")]
+    {
+        let v73 = [b"MATLAB 7.3 MAT-file".as_slice(), &[b' '; 600]].concat();
+        assert!(message(&v73, None).contains("is not readable HDF5"));
+    }
     let v4 = [0u32, 3, 2, 0, 2, 0x78, 0, 0, 0, 0].map(u32::to_le_bytes).concat();
     assert!(message(&[v4, vec![0; 200]].concat(), None).contains("version 4"));
     assert!(

@@ -138,6 +138,30 @@ fn quantities_do_not_depend_on_their_company() {
     }
 }
 
+/// Spectra in the caller's memory are those of the windows, put end to end.
+#[test]
+fn what_is_filled_is_what_is_drawn() {
+    let draws = Stream::new(35).draws(9..9 + COUNT);
+    for layout in [Layout::Rows, Layout::PaddedRows] {
+        let recipe = surfaces().quantities(all_but(Quantity::Intensity)).layout(layout).build();
+        let recipe = recipe.expect("it can be drawn");
+        for engine in [&cpu(), gpu()] {
+            let mut windows = Vec::new();
+            let summary = engine.draw(&recipe, draws, |batch| {
+                windows.extend_from_slice(batch.spectra());
+                Ok::<_, EngineError>(())
+            });
+            let mut filled = vec![1.0; windows.len()];
+            let mut drawer = engine.drawer(&recipe).expect("the engine works");
+            if layout == Layout::PaddedRows {
+                filled.fill(0.0); // the CPU leaves padding as it is
+            }
+            assert_eq!(drawer.fill(draws, &mut filled), summary);
+            assert!(filled == windows, "{engine}");
+        }
+    }
+}
+
 /// A program in loops has the same quantities, too.
 #[test]
 fn programs_in_loops_have_the_same_values_on_every_engine() {

@@ -8,14 +8,11 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
+use spectroll::statistics::tinted;
 use spectroll::{
     Bounds, Builtin, Choice, Dataset, Draws, Engine, EngineError, Extend, Fit, Grid, Kind, Model, Real,
     Recipe, Stream, Tally, colorimetry,
 };
-
-#[path = "statistics/tinted.rs"]
-mod tinted;
-use tinted::tinted;
 
 /// How far an adapter that fuses may be off, in units in the last place of the largest term.
 const ULPS: f64 = 16.0;

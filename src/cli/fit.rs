@@ -10,9 +10,10 @@ use super::{Usage, existing, grouped};
 
 /// Fit a model to measured spectra
 ///
-/// Files are MATLAB v5 (a matrix X of spectra in columns, and S_X = [start step count] beside it; FILE.mat:X picks
-/// one of several) or CSV (wavelengths in the first column, a spectrum in each other one). The names munsell and
-/// vrhel stand for built-in tables. Several are fitted together.
+/// Files are MATLAB's (a matrix X of spectra in columns, and S_X = [start step count] or a vector wavelength beside it;
+/// FILE.mat:X picks one of several), .h5 (the same, spectra in rows), CSV (wavelengths in the first column, a spectrum
+/// in each other one) or .npy (spectra in rows, at --wavelengths). The names munsell and vrhel stand for built-in
+/// tables. Several are fitted together.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// Files of spectra, or munsell, vrhel
@@ -24,9 +25,9 @@ pub(crate) struct Arguments {
     /// What the spectra are [default: what the name of the variable says: sur_X, spd_X, daylightX]
     #[arg(long, value_enum)]
     kind: Option<KindName>,
-    /// The wavelengths, start:step:stop in nm
-    #[arg(long, default_value_t = Grid::DEFAULT, value_name = "GRID")]
-    wavelengths: Grid,
+    /// The wavelengths, start:step:stop in nm [default: 400:10:700]
+    #[arg(long, value_name = "GRID")]
+    wavelengths: Option<Grid>,
     /// What each spectrum is divided by first [default: mean for illuminants, none for reflectances]
     #[arg(long, value_enum)]
     normalize: Option<NormalizationName>,
@@ -68,14 +69,18 @@ enum ExtendName {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let tables = arguments.files.iter().map(|f| table(f)).collect::<anyhow::Result<Vec<_>>>()?;
+    let tables = arguments
+        .files
+        .iter()
+        .map(|file| table(file, arguments.wavelengths))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let kind = kind(arguments, &tables)?;
     let extend = match arguments.extend {
         ExtendName::Error => Extend::Error,
         ExtendName::Hold => Extend::Hold,
         ExtendName::Zero => Extend::Zero,
     };
-    let data = Dataset::new(&tables, arguments.wavelengths, extend)?;
+    let data = Dataset::new(&tables, arguments.wavelengths.unwrap_or(Grid::DEFAULT), extend)?;
     let mut fit = Fit::new(kind).components(arguments.components);
     if let Some(normalize) = arguments.normalize {
         fit = fit.normalization(match normalize {
@@ -103,8 +108,8 @@ fn report(model: &Model, data: &Dataset, path: &Path) {
     );
 }
 
-/// The table of a built-in name, a file, or file:variable.
-fn table(name: &str) -> anyhow::Result<Table> {
+/// The table of a built-in name, a file, or file:variable; at these wavelengths where the file does not say.
+fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
     if let Some(builtin) = Builtin::named(name) {
         return Ok(builtin.table());
     }
@@ -112,7 +117,7 @@ fn table(name: &str) -> anyhow::Result<Table> {
         Some((file, variable)) if !Path::new(name).exists() => (file, Some(variable)),
         _ => (name, None),
     };
-    Ok(Table::open(Path::new(path), variable)?)
+    Ok(Table::open_on(Path::new(path), variable, grid)?)
 }
 
 /// What the spectra are: as said, else as their names say, if those agree.

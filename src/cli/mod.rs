@@ -3,20 +3,28 @@
 
 mod adapters;
 mod bench;
+mod config;
+mod dry_run;
 mod fit;
+mod generate;
 mod inspect;
 mod picture;
-mod recipe;
+mod progress;
+mod report;
+mod request;
 mod sample;
 mod shader;
+mod shard;
+mod sink;
+mod verify;
 
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::{Parser, Subcommand, ValueEnum};
-use spectroll::output::Existing;
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
+use spectroll::output::{Existing, OutputError};
 use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, RecipeError, TextError};
 
 /// Draws random, physically valid natural spectra on the GPU.
@@ -25,6 +33,9 @@ use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, 
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// A file of flags, as in `count = 1000`; flags beside it win
+    #[arg(long, global = true, value_name = "FILE.toml")]
+    config: Option<String>,
 }
 
 const EXAMPLES: &str = "\
@@ -32,21 +43,29 @@ Examples:
   spectroll sample munsell-vrhel -n 1000000 -o reflectances.npy
   spectroll sample granada -n 1000 -o - --seed 7 > daylights.csv
   spectroll sample munsell-vrhel -n 10000 --lrv 0.4 --bounds scaled -o targets.npy
+  spectroll sample munsell-vrhel -n 1000000 -o reflectances.zarr --zstd
+  spectroll verify reflectances.zarr
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
   spectroll shader granada --quantities srgb --prefix sun > sun.wgsl
   spectroll inspect munsell-vrhel -o munsell-vrhel.png
+  spectroll report munsell-vrhel -o report --quick
 
 Exit codes: 0 done, 1 failed while running, 2 wrong usage or impossible request, 3 no such adapter,
-4 bad input data, 130 interrupted.";
+4 bad input data, 5 a data set is not what was written, 130 interrupted.";
 
 #[derive(Subcommand)]
 enum Command {
     Fit(fit::Arguments),
     Sample(sample::Arguments),
+    Verify(verify::VerifyArguments),
+    Merge(verify::MergeArguments),
     Inspect(inspect::Arguments),
     Shader(shader::Arguments),
     Adapters(adapters::Arguments),
     Bench(bench::Arguments),
+    Report(report::Arguments),
+    Completions(generate::CompletionsArguments),
+    Man(generate::ManArguments),
 }
 
 /// Where to draw.
@@ -88,8 +107,13 @@ impl EngineArguments {
 
 /// Somebody pressed Ctrl-C.
 #[derive(Debug, thiserror::Error)]
-#[error("interrupted; nothing was left behind")]
-struct Interrupted;
+#[error("interrupted; {0}")]
+struct Interrupted(String);
+
+/// A data set is not what was written.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Unverified(String);
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -100,20 +124,17 @@ fn watch_interrupts() {
 
 /// An error once Ctrl-C was pressed: long work asks from time to time.
 fn check_interrupt() -> Result<(), Interrupted> {
-    if INTERRUPTED.load(Ordering::Relaxed) { Err(Interrupted) } else { Ok(()) }
+    match INTERRUPTED.load(Ordering::Relaxed) {
+        true => Err(Interrupted("nothing was left behind".to_owned())),
+        false => Ok(()),
+    }
 }
 
 /// Runs the program.
 pub(crate) fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    let result = match &arguments.command {
-        Command::Fit(arguments) => fit::run(arguments),
-        Command::Sample(arguments) => sample::run(arguments),
-        Command::Inspect(arguments) => inspect::run(arguments),
-        Command::Shader(arguments) => shader::run(arguments),
-        Command::Adapters(arguments) => adapters::run(arguments),
-        Command::Bench(arguments) => bench::run(arguments),
-    };
+    let result = config::expand(&Arguments::command(), std::env::args_os().collect());
+    let result =
+        result.map_err(anyhow::Error::from).and_then(|words| run(Arguments::parse_from(words).command));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS, // the reader has what it wanted
@@ -121,6 +142,22 @@ pub(crate) fn main() -> ExitCode {
             eprintln!("error: {error}"); // our messages hold their causes
             ExitCode::from(exit_code(&error))
         }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<()> {
+    match &command {
+        Command::Fit(arguments) => fit::run(arguments),
+        Command::Sample(arguments) => sample::run(arguments),
+        Command::Verify(arguments) => verify::run(arguments),
+        Command::Merge(arguments) => verify::join(arguments),
+        Command::Inspect(arguments) => inspect::run(arguments),
+        Command::Shader(arguments) => shader::run(arguments),
+        Command::Adapters(arguments) => adapters::run(arguments),
+        Command::Bench(arguments) => bench::run(arguments),
+        Command::Report(arguments) => report::run(arguments),
+        Command::Completions(arguments) => generate::completions(Arguments::command(), arguments),
+        Command::Man(arguments) => generate::man(Arguments::command(), arguments),
     }
 }
 
@@ -132,6 +169,8 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         3
     } else if error.is::<DatasetError>() || error.is::<FitError>() || error.is::<ModelError>() {
         4
+    } else if error.is::<Unverified>() || matches!(error.downcast_ref(), Some(OutputError::Damaged { .. })) {
+        5
     } else if error.is::<RecipeError>() || error.is::<TextError>() || error.is::<Usage>() {
         2
     } else {
@@ -166,6 +205,18 @@ fn model(name: &str) -> anyhow::Result<Model> {
 /// What `--force` says of a file that exists.
 fn existing(force: bool) -> Existing {
     if force { Existing::Replace } else { Existing::Keep }
+}
+
+/// A count: digits, with `_` between them as one likes, or a whole number like 1e6.
+fn count(text: &str) -> Result<u64, String> {
+    let digits = text.replace('_', "");
+    if let Ok(count) = digits.parse() {
+        return Ok(count);
+    }
+    match digits.parse::<f64>() {
+        Ok(value) if value >= 0.0 && value.fract() == 0.0 && value < 9e15 => Ok(value as u64),
+        _ => Err("expected a whole number, like 1000000 or 1e6".to_owned()),
+    }
 }
 
 /// A number with its thousands set apart.

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::model;
-use super::recipe::RecipeArguments;
+use super::request::Request;
 
 /// Print the draw as WGSL functions, for a shader of your own
 ///
@@ -17,7 +17,7 @@ pub(crate) struct Arguments {
     #[arg(value_name = "MODEL")]
     model: String,
     #[command(flatten)]
-    recipe: RecipeArguments,
+    request: Request,
     /// What every name starts with
     #[arg(long, default_value = "spectroll")]
     prefix: String,
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = model(&arguments.model)?;
-    let recipe = arguments.recipe.recipe(&model)?.build()?;
+    let recipe = arguments.request.recipe(&model)?;
     let text = recipe.wgsl(&arguments.prefix)?;
     let mut out = std::io::stdout().lock();
     if arguments.naga_oil {

@@ -26,7 +26,7 @@ struct Column<'a> {
 
 /// Makes all of `draws` in f32, in order, on all cores. Each array has the words of one output, and is as long as
 /// [`Format::bytes`] says. Padding is left as it is.
-pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [Vec<u32>]) {
+pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]) {
     let count = draws.count as usize;
     let size = (count / (4 * rayon::current_num_threads())).clamp(8 * LANES, CHUNK).next_multiple_of(4);
     let mut chunks: Vec<Vec<Column>> = (0..count.div_ceil(size)).map(|_| Vec::new()).collect();
@@ -43,7 +43,7 @@ pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [Vec<u32>]) 
 
 /// The columns of each `size` draws, a multiple of 4.
 fn split(format: Format, words: &mut [u32], count: usize, size: usize) -> Vec<Column<'_>> {
-    let words_of = |values: usize| (values * format.element_bytes()).div_ceil(4);
+    let words_of = |values: usize| (values * format.element.size()).div_ceil(4);
     let plane = words_of(format.values(count as u64) as usize / format.planes());
     let mut columns: Vec<_> =
         (0..count.div_ceil(size)).map(|_| Column { format, planes: Vec::new() }).collect();
@@ -231,7 +231,8 @@ mod tests {
             for count in [0, 1, 4097, 20_003] {
                 let draws = Stream::new(2).draws(0..count);
                 let mut filled = arrays(&kernel, count);
-                fill(&kernel, draws, &mut filled);
+                let mut slices: Vec<_> = filled.iter_mut().map(Vec::as_mut_slice).collect();
+                fill(&kernel, draws, &mut slices);
                 assert!(
                     filled == if count == 0 { arrays(&kernel, 0) } else { in_lanes::<1>(&kernel, draws) }
                 );
@@ -256,6 +257,7 @@ mod tests {
                     };
                     match format.element {
                         Element::U32 => assert_eq!(bytemuck::cast::<_, Tally>(words[i as usize]), tally),
+                        Element::F64 => unreachable!("draws are not in f64"),
                         Element::F32 => {
                             (0..format.width).for_each(|j| assert_eq!(words[at(j)], values[j].to_bits()))
                         }

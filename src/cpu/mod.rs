@@ -13,6 +13,7 @@ mod columns;
 
 pub(crate) use columns::fill;
 
+use crate::cover::Proposal;
 use crate::dataset::Kind;
 use crate::level::{self, Level};
 use crate::normal::Real;
@@ -25,6 +26,7 @@ pub(crate) struct Kernel<R> {
     spectrum: Map<R>,
     target: Option<Target<R>>,
     level: Option<Level<R>>,
+    proposal: Option<Proposal<R>>,
     /// What a physical value is below, before scaling.
     limit: R,
     tests_scaled: bool,
@@ -118,6 +120,7 @@ impl<R: Real> Kernel<R> {
                 .as_ref()
                 .map(|t| Target { lrv: R::from_f64(t.lrv), weights: round(&t.weights) }),
             level: program.level.as_ref().map(Level::new),
+            proposal: program.proposal.as_ref().map(Proposal::rounded),
             limit,
             tests_scaled: program.tests_scaled(),
             may_exceed_one: program.may_exceed_one(),
@@ -125,6 +128,12 @@ impl<R: Real> Kernel<R> {
             max_attempts: program.max_attempts,
             outputs: program.outputs.iter().map(output).collect(),
         }
+    }
+
+    /// The number of bands.
+    #[cfg(feature = "report")]
+    pub(crate) fn bands(&self) -> usize {
+        self.spectrum.offset.len()
     }
 
     /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
@@ -144,9 +153,9 @@ impl<R: Real> Kernel<R> {
     /// rejected.
     pub(crate) fn candidate(&self, mut block: impl FnMut(u32) -> [u32; 4]) -> Option<Vec<Vec<R>>> {
         let mut candidates = self.candidates::<1>();
-        make_normals(&mut candidates.normals, |b| block(b).map(|word| [word]));
+        let kept = self.propose(&mut candidates, |b| block(b).map(|word| [word]));
         let word = self.level.as_ref().map(|_| [block(level::BLOCK)[0]]);
-        let verdicts = self.judge(&mut candidates, word);
+        let verdicts = self.judge(&mut candidates, kept, word);
         verdicts.accepted[0].then(|| self.values(&candidates, Tally::accepted(1, false)))
     }
 
@@ -186,9 +195,9 @@ impl<R: Real> Kernel<R> {
         }
         while lanes.iter().any(Option::is_some) {
             let index = [low, high];
-            make_normals(&mut candidates.normals, |b| draws.stream.blocks(index, attempts, b));
+            let kept = self.propose(&mut candidates, |b| draws.stream.blocks(index, attempts, b));
             let word = self.level.as_ref().map(|_| draws.stream.blocks(index, [0; L], level::BLOCK)[0]);
-            let verdicts = self.judge(&mut candidates, word);
+            let verdicts = self.judge(&mut candidates, kept, word);
             for l in 0..L {
                 let Some(number) = lanes[l] else { continue };
                 attempts[l] += 1;
@@ -218,11 +227,29 @@ impl<R: Real> Kernel<R> {
         }
     }
 
-    /// Makes the candidates of the normals, and of the words of their levels if there are any, and judges them.
+    /// Proposes candidates, of the words that `block` gives for each block. Returns whether each is to be judged.
+    #[inline(always)]
+    fn propose<const L: usize>(
+        &self,
+        candidates: &mut Candidates<R, L>,
+        block: impl FnMut(u32) -> [[u32; L]; 4],
+    ) -> [bool; L] {
+        match &self.proposal {
+            Some(proposal) => proposal.propose(&mut candidates.normals, block),
+            None => {
+                make_normals(&mut candidates.normals, block);
+                [true; L]
+            }
+        }
+    }
+
+    /// Makes the candidates that were proposed, with the words of their levels if there are any, and judges those that
+    /// were kept.
     #[inline(always)]
     fn judge<const L: usize>(
         &self,
         candidates: &mut Candidates<R, L>,
+        kept: [bool; L],
         word: Option<[u32; L]>,
     ) -> Verdicts<L> {
         let mut physical = Range::new();
@@ -231,7 +258,7 @@ impl<R: Real> Kernel<R> {
             physical.include(s);
         }
         let mut verdicts = Verdicts {
-            accepted: std::array::from_fn(|l| physical.is_within(l, self.limit)),
+            accepted: std::array::from_fn(|l| kept[l] & physical.is_within(l, self.limit)),
             above_one: [false; L],
         };
         if let Some(target) = &self.target {

@@ -1,7 +1,7 @@
-//! MATLAB v5 files by the field's convention: a matrix of spectra, and its sampling `S_x` = [start step count] (nm)
-//! beside it, as in `sur_vrhel` with `S_vrhel`.
+//! MATLAB files by the field's conventions: a matrix of spectra, and its sampling `S_x` = [start step count] (nm)
+//! beside it, as in `sur_vrhel` with `S_vrhel`, or else a vector `wavelength`.
 //!
-//! The `matfile` crate decodes numeric arrays. This module walks the file's elements first, for three things which
+//! The `matfile` crate decodes the numeric arrays of v5 files. This module walks the file's elements first, for three things which
 //! that crate leaves to its caller: unpacking is capped, what is not a numeric array (structs, cells, objects) is
 //! stepped over rather than failing the file, and dimensions are checked against the bytes that are there.
 
@@ -19,16 +19,22 @@ const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
 /// A two-dimensional real array, column by column.
-struct Matrix {
-    name: String,
-    rows: usize,
-    columns: usize,
-    values: Vec<f64>,
+pub(super) struct Matrix {
+    pub(super) name: String,
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+    pub(super) values: Vec<f64>,
 }
 
 pub(super) fn read(path: &Path, bytes: &[u8], variable: Option<&str>) -> Result<Table, DatasetError> {
-    let matrices = matrices(path, bytes)?;
-    let samplings: Vec<_> = matrices.iter().filter_map(sampling).collect();
+    let matrices = match is_hdf5(bytes) {
+        true => hdf5(path)?,
+        false => matrices(path, bytes)?,
+    };
+    let mut samplings: Vec<_> = matrices.iter().filter_map(sampling).collect();
+    if samplings.is_empty() {
+        samplings.extend(matrices.iter().filter_map(wavelengths));
+    }
     let spectra: Vec<_> = matrices
         .iter()
         .filter_map(|m| Some((m, grid_of(m, &samplings)?)))
@@ -79,10 +85,19 @@ fn sampling(matrix: &Matrix) -> Option<(String, Grid)> {
     (count.fract() == 0.0).then(|| Grid::new(start, step, count as usize).ok())?.map(|grid| (suffix, grid))
 }
 
+/// The grid of a vector of wavelengths, which is for every matrix of the file.
+fn wavelengths(matrix: &Matrix) -> Option<(String, Grid)> {
+    let is_named = matches!(matrix.name.to_ascii_lowercase().as_str(), "wavelength" | "wavelengths" | "wave");
+    let is_vector = matrix.rows == 1 || matrix.columns == 1;
+    (is_named && is_vector)
+        .then(|| Grid::from_wavelengths(&matrix.values).ok())?
+        .map(|grid| (String::new(), grid))
+}
+
 /// The sampling that belongs to a matrix: the one whose suffix ends the matrix's name, else the only one in the file;
 /// and one of the matrix's sides must be as long as it says.
 fn grid_of(matrix: &Matrix, samplings: &[(String, Grid)]) -> Option<Grid> {
-    if matrix.name.starts_with("S_") {
+    if matrix.name.starts_with("S_") || wavelengths(matrix).is_some() {
         return None;
     }
     let name = matrix.name.to_ascii_lowercase();
@@ -133,15 +148,27 @@ fn matrices(path: &Path, bytes: &[u8]) -> Result<Vec<Matrix>, DatasetError> {
     Ok(matrices)
 }
 
+/// Whether the file is HDF5: of version 7.3, or not of MATLAB at all.
+fn is_hdf5(bytes: &[u8]) -> bool {
+    const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+    bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(HDF5) || bytes.get(512..520) == Some(HDF5)
+}
+
+#[cfg(feature = "hdf5")]
+fn hdf5(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
+    super::hdf5::matrices(path)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn hdf5(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
+    let reason =
+        "this build leaves out HDF5: build it with --features hdf5, or resave with save(file, '-v7')";
+    Err(DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() })
+}
+
 /// Whether the file is little-endian; an error says what else it is.
 fn endianness(bytes: &[u8]) -> Result<bool, &'static str> {
-    const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
-    const V7_3: &str =
-        "it is of version 7.3 (HDF5), which is not supported yet: resave it with save(file, '-v7')";
     const V4: &str = "it is of version 4, which is not supported: resave it with save(file, '-v7')";
-    if bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(HDF5) || bytes.get(512..520) == Some(HDF5) {
-        return Err(V7_3);
-    }
     match bytes.get(126..HEADER) {
         Some(b"IM") => return Ok(true),
         Some(b"MI") => return Ok(false),

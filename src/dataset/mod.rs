@@ -5,7 +5,10 @@
 
 mod builtin;
 mod csv;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 mod mat;
+mod npy;
 
 use std::fmt;
 use std::io::Read;
@@ -50,14 +53,20 @@ pub enum DatasetError {
     TooLarge { path: PathBuf },
     #[error("{path:?} is empty")]
     Empty { path: PathBuf },
-    #[error("{path:?}: unknown type of file; expected .mat, .csv, .tsv or .txt")]
+    #[error("{path:?}: unknown type of file; expected .mat, .h5, .npy, .csv, .tsv or .txt")]
     UnknownType { path: PathBuf },
     #[error("{path:?} is not a readable MATLAB file: {reason}")]
     Mat { path: PathBuf, reason: String },
+    #[error("{path:?} is not readable HDF5: {reason}")]
+    Hdf5 { path: PathBuf, reason: String },
+    #[error("{path:?} is not a readable array of NumPy's: {reason}")]
+    Npy { path: PathBuf, reason: String },
+    #[error("{path:?} does not say at which wavelengths its spectra are: pass --wavelengths start:step:stop")]
+    NoWavelengths { path: PathBuf },
     #[error("{path:?}, line {line}: {reason}")]
     Csv { path: PathBuf, line: u64, reason: String },
     #[error(
-        "{path:?} holds no matrix of spectra with its sampling beside it (X with S_X = [start step count]); it holds {found}"
+        "{path:?} holds no matrix of spectra with its sampling beside it (X with S_X = [start step count], or a vector wavelength); it holds {found}"
     )]
     NoMatrix { path: PathBuf, found: String },
     #[error("{path:?} holds several matrices of spectra: say which, as in {}:{}", path.display(), candidates[0])]
@@ -131,13 +140,19 @@ impl Table {
         Ok(Table { source: name.clone(), name, wavelengths, spectra, kind: None })
     }
 
-    /// Reads a MATLAB v5 `.mat` file, or a `.csv`, `.tsv` or `.txt` file with the wavelengths in the first column and
-    /// a spectrum in each other one. `variable` picks a matrix where a `.mat` file holds several.
+    /// Reads a MATLAB file or an `.h5` one, or a `.csv`, `.tsv` or `.txt` file with the wavelengths in the first column
+    /// and a spectrum in each other one. `variable` picks a matrix where a `.mat` or `.h5` file holds several.
     pub fn open(path: &Path, variable: Option<&str>) -> Result<Table, DatasetError> {
+        Table::open_on(path, variable, None)
+    }
+
+    /// The same, and `.npy` with spectra in rows, whose wavelengths are `grid`.
+    pub fn open_on(path: &Path, variable: Option<&str>, grid: Option<Grid>) -> Result<Table, DatasetError> {
         let bytes = read_capped(path)?;
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         let mut table = match extension.as_str() {
-            "mat" => mat::read(path, &bytes, variable),
+            "mat" | "h5" | "hdf5" => mat::read(path, &bytes, variable),
+            "npy" => npy::read(path, &bytes, grid),
             "csv" | "tsv" | "txt" => csv::read(path, &bytes),
             _ => Err(DatasetError::UnknownType { path: path.to_owned() }),
         }?;

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::{Batch, EngineError, Member, Pace, Window};
 use crate::cpu::{self, Kernel};
-use crate::quantity::Format;
+use crate::quantity::{Format, Quantity};
 use crate::stream::Draws;
 
 /// How many windows there are: one with the caller, one being computed, one between them.
@@ -39,6 +39,32 @@ impl<'a> Drawer<'a> {
         let roles: Vec<_> = members.iter().map(role).collect();
         let pace = Pace::new(members, roles.iter().map(|role| role.formats.as_slice()), u64::MAX);
         Drawer { pool, members: roles, pace, rooms: Vec::new() }
+    }
+
+    /// Makes `draws` of the only member with their spectra in the caller's memory, which has as many words as they
+    /// need, and hands them to `sink` as one batch.
+    pub(super) fn fill<E>(
+        &mut self,
+        draws: Draws,
+        spectra: &mut [u32],
+        sink: &mut impl FnMut(Batch) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Role { kernel, formats, .. } = &self.members[0];
+        let words = |format: &Format| format.bytes(draws.count).div_ceil(4) as usize;
+        let is_spectra = |format: &&Format| format.quantity == Quantity::Spectra;
+        let mut others: Vec<_> =
+            formats.iter().filter(|f| !is_spectra(f)).map(|format| vec![0; words(format)]).collect();
+        let mut spectra = Some(spectra);
+        let mut rest = others.iter_mut();
+        let mut arrays: Vec<&mut [u32]> = Vec::new();
+        for format in formats {
+            arrays.push(match is_spectra(&format) {
+                true => spectra.take().expect("each quantity is there once"),
+                false => rest.next().expect("there is one for each"),
+            });
+        }
+        self.pool.install(|| cpu::fill(kernel, draws, &mut arrays));
+        sink(Batch::new(draws, formats, arrays.iter().map(|words| bytemuck::cast_slice(words))))
     }
 
     pub(super) fn draw<E: From<EngineError>>(
@@ -94,7 +120,8 @@ fn compute(
             for (format, words) in member.formats.iter().zip(&mut *arrays) {
                 words.resize(format.bytes(part.count).div_ceil(4) as usize, 0);
             }
-            pool.install(|| cpu::fill(&member.kernel, part, arrays));
+            let mut arrays: Vec<_> = arrays.iter_mut().map(Vec::as_mut_slice).collect();
+            pool.install(|| cpu::fill(&member.kernel, part, &mut arrays));
         }
         pace.learn(window.steps, start);
         offset += window.steps;

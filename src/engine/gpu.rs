@@ -64,7 +64,7 @@ impl Gpu {
         &self.adapter
     }
 
-    #[cfg(test)]
+    #[cfg(any(test, feature = "report"))]
     pub(super) fn device(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.device, &self.queue)
     }

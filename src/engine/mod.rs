@@ -238,8 +238,8 @@ impl Engine {
         }
     }
 
-    /// The device that draws and its queue, for tests of what runs on it.
-    #[cfg(test)]
+    /// The device that draws and its queue, for tests and measurements of what runs on it.
+    #[cfg(any(test, feature = "report"))]
     pub(crate) fn device(&self) -> Option<(&wgpu::Device, &wgpu::Queue)> {
         match &self.device {
             Device::Gpu(gpu) => Some(gpu.device()),
@@ -272,19 +272,14 @@ impl Engine {
         self.drawer(recipe)?.draw(draws, sink)
     }
 
-    /// Makes `draws` and returns their spectra: a value for each draw and band, draw by draw.
+    /// Makes `draws` and returns their spectra, as [`Drawer::fill`] does, which is what to use for more than one range.
     ///
     /// # Panics
-    /// Where the recipe asks for them in 16 bits or in planes, which cannot be put end to end.
+    /// Where [`Drawer::fill`] does.
     pub fn collect(&self, recipe: &Recipe, draws: Draws) -> Result<Vec<f32>, EngineError> {
-        let mut spectra = Vec::new();
-        self.draw(recipe, draws, |batch| {
-            let rows =
-                |format: &Format| format.quantity != Quantity::Spectra || format.layout != Layout::Planes;
-            assert!(batch.formats().iter().all(rows), "spectra in planes cannot be put end to end");
-            spectra.extend_from_slice(batch.spectra());
-            Ok::<_, EngineError>(())
-        })?;
+        let mut drawer = self.drawer(recipe)?;
+        let mut spectra = vec![0.0; drawer.values(draws)];
+        drawer.fill(draws, &mut spectra)?;
         Ok(spectra)
     }
 }
@@ -296,6 +291,49 @@ pub struct Drawer<'a> {
 }
 
 impl Drawer<'_> {
+    /// How many values the spectra of `draws` have: rows, one after the other.
+    fn values(&self, draws: Draws) -> usize {
+        let format = self.recipe.formats().into_iter().find(|format| format.quantity == Quantity::Spectra);
+        let format = format.expect("the recipe asks for spectra");
+        assert!(format.element == Element::F32, "the spectra are F16, not F32");
+        assert!(format.layout != Layout::Planes, "spectra in planes cannot be put end to end");
+        format.values(draws.count) as usize
+    }
+
+    /// Makes `draws` with their spectra in the caller's memory: draw by draw, a value for each band, and room
+    /// for padding if the recipe asks for it, which the CPU leaves as it is. It writes the rest there as it makes it.
+    ///
+    /// # Panics
+    /// Where the slice is not as long as they are, or the recipe asks for no spectra, in 16 bits, or in planes.
+    pub fn fill(&mut self, draws: Draws, spectra: &mut [f32]) -> Result<Summary, EngineError> {
+        assert_eq!(
+            spectra.len(),
+            self.values(draws),
+            "{} draws do not fit what is there for them",
+            draws.count
+        );
+        let mut summary = Summary::default();
+        let max_attempts = self.recipe.program().max_attempts;
+        match &mut self.ensemble.0 {
+            _ if draws.count == 0 => {}
+            Way::Gpu(drawer) => {
+                let mut rest = spectra;
+                drawer.draw(&[draws], draws.count, &mut |batches: &[Batch]| {
+                    summary.add(&batches[0], max_attempts)?;
+                    let values = batches[0].spectra();
+                    let (window, after) = std::mem::take(&mut rest).split_at_mut(values.len());
+                    window.copy_from_slice(values);
+                    rest = after;
+                    Ok::<_, EngineError>(())
+                })?;
+            }
+            Way::Cpu(drawer) => drawer.fill(draws, bytemuck::cast_slice_mut(spectra), &mut |batch| {
+                summary.add(&batch, max_attempts)
+            })?,
+        }
+        Ok(summary)
+    }
+
     /// Makes `draws` and hands them to `sink` in order, window by window. The first error ends it.
     pub fn draw<E: From<EngineError>>(
         &mut self,

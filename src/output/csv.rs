@@ -1,32 +1,78 @@
-//! Text: a header of wavelengths in nm, then a line a spectrum, each value the shortest decimal that reads back as
-//! the same f32.
+//! Text: a header, then a line a draw, each value the shortest decimal that reads back as the same number. The columns
+//! of spectra are headed by their wavelengths in nm. Nothing in it ever needs quotes.
 
+use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use crate::engine::Batch;
-use crate::grid::Grid;
+use super::Encoder;
+use super::schema::{Field, Schema};
+use crate::quantity::Element;
 
-pub(super) fn begin(to: &mut dyn Write, grid: Grid) -> io::Result<()> {
-    lines(to, [grid.wavelengths().map(|w| w.to_string())])
+pub(super) struct Csv<W: Write> {
+    to: W,
+    schema: Schema,
+    /// The lines of a window, whose memory the next one uses.
+    text: String,
 }
 
-pub(super) fn write(to: &mut dyn Write, batch: &Batch) -> io::Result<()> {
-    let bands = batch.spectra().len() / batch.draws.count as usize;
-    let spectra = batch.spectra().chunks_exact(bands);
-    lines(to, spectra.map(|spectrum| spectrum.iter().map(|value| value.to_string())))
-}
-
-fn lines<L: IntoIterator<Item = String>>(
-    to: &mut dyn Write,
-    lines: impl IntoIterator<Item = L>,
-) -> io::Result<()> {
-    let mut writer = ::csv::Writer::from_writer(to);
-    for line in lines {
-        // The crate's own conversion would hide what kind of error it was.
-        writer.write_record(line).map_err(|e| match e.into_kind() {
-            ::csv::ErrorKind::Io(error) => error,
-            other => io::Error::other(format!("{other:?}")),
-        })?;
+impl<W: Write> Csv<W> {
+    pub(super) fn begin(mut to: W, schema: &Schema) -> io::Result<Self> {
+        let names: Vec<_> =
+            schema.fields.iter().flat_map(|field| names(field, &schema.wavelengths)).collect();
+        writeln!(to, "{}", names.join(","))?;
+        to.flush()?;
+        Ok(Csv { to, schema: schema.clone(), text: String::new() })
     }
-    writer.flush()
+}
+
+impl<W: Write> Encoder for Csv<W> {
+    fn write(&mut self, columns: &[&[u8]]) -> io::Result<()> {
+        self.text.clear();
+        for row in 0..self.schema.rows(columns) {
+            for (field, column) in self.schema.fields.iter().zip(columns) {
+                let size = field.delivered_bytes();
+                for value in field.values(&column[row * size..(row + 1) * size]) {
+                    push(&mut self.text, field.stored, value);
+                    self.text.push(',');
+                }
+            }
+            self.text.pop();
+            self.text.push('\n');
+        }
+        self.to.write_all(self.text.as_bytes())?;
+        self.to.flush()
+    }
+
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+/// The headings of a field's columns.
+fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
+    if let Some((_, count)) = &field.outer {
+        let one = Field { name: field.name.clone(), outer: None, width: field.width / count, ..field.clone() };
+        let inner = names(&one, wavelengths);
+        let heading = |i, inner: &String| match field.axis {
+            Some(_) => format!("{}_{i}_{}", field.name, inner.trim_start_matches(&format!("{}_", field.name))),
+            None => format!("{}_{i}", field.name),
+        };
+        return (0..*count).flat_map(|i| inner.iter().map(move |inner| heading(i, inner))).collect();
+    }
+    match field.axis.as_deref() {
+        Some("wavelength") => wavelengths.iter().map(f64::to_string).collect(),
+        Some(_) => (1..=field.width).map(|i| format!("{}_{i}", field.name)).collect(),
+        None => vec![field.name.clone()],
+    }
+}
+
+/// Adds the shortest decimal that reads back as the same value of its type.
+fn push(text: &mut String, element: Element, value: f64) {
+    match element {
+        Element::F64 | Element::U32 => write!(text, "{value}"),
+        Element::F32 => write!(text, "{}", value as f32),
+        // Its own shortest form would be ambiguous to those who read it as anything else.
+        Element::F16 => write!(text, "{}", half::f16::from_f64(value).to_f32()),
+    }
+    .expect("a string takes it all");
 }

@@ -1,191 +1,272 @@
-//! Files of spectra, one format a module. A file appears under its name only when it is complete.
+//! Data sets as files, one format a module. What is under its name is complete.
+//!
+//! A data set is columns of numbers, a row a draw ([`Schema`]). It comes in windows of any length, in order, and ends
+//! in a single file ([`FileWriter`]), a folder of text files ([`SpdFolder`]), or a set of chunks that can be resumed
+//! and shared ([`SetWriter`]).
 
 mod csv;
+#[cfg(feature = "hdf5")]
+mod h5;
+#[cfg(feature = "hdf5")]
+mod mat;
 mod npy;
+mod npz;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod parts;
+mod pending;
+mod schema;
+mod set;
+mod spd;
+mod zarr;
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use crate::quantity::Element;
 
-use crate::engine::Batch;
-use crate::grid::Grid;
+pub use pending::{Existing, Pending, write_file};
+pub use schema::{Constant, Field, Schema};
+pub use set::{Audit, Layout, Outcome, Plan, SetWriter, Shard, Start, merge};
+pub use spd::{MOST_FILES, SpdFolder, SpdName};
 
-/// A format of files of spectra.
+/// A format of data sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// NumPy: float32, (draws, bands), C order.
+    /// NumPy: one array, C order.
     Npy,
-    /// Text: a header of wavelengths in nm, then a line a spectrum.
+    /// NumPy: an array a quantity.
+    Npz,
+    /// Text: a line a draw.
     Csv,
+    /// HDF5, chunked by draws.
+    Hdf5,
+    /// MATLAB v7.3.
+    Mat,
+    /// Parquet: a column a quantity.
+    Parquet,
+    /// A Zarr store, version 3.
+    Zarr,
+    /// A folder of text files, one a spectrum.
+    Spd,
 }
 
-/// Why a file cannot be written.
+/// Why a data set cannot be written, or not used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum OutputError {
-    #[error("{path:?}: unknown format; name it .npy or .csv, or pass --format")]
+    #[error("{path:?}: unknown format; name it {}, or pass --format", Format::EXTENSIONS)]
     UnknownFormat { path: PathBuf },
     #[error("{path:?} exists already: choose another name, or pass --force to replace it")]
     Exists { path: PathBuf },
     #[error("{path:?} is a folder: name a file")]
     Folder { path: PathBuf },
+    #[error("{path:?} is a folder that exists already: name another")]
+    FolderExists { path: PathBuf },
+    #[error("{path:?} is not a folder, and a folder is what would be written: name another")]
+    NotAFolder { path: PathBuf },
     #[error("{path:?} is not a plain file, and would be replaced by one: name another")]
     Special { path: PathBuf },
     #[error("{folder:?} does not exist: create it first")]
     NoFolder { folder: PathBuf },
     #[error("cannot write {path:?}: {source}")]
     Write { path: PathBuf, source: io::Error },
+    #[error("{path:?}: {format} files hold {holds}; {remedy}")]
+    Cannot { path: PathBuf, format: &'static str, holds: &'static str, remedy: &'static str },
+    #[error("{path:?}: this build leaves out {what}: build it with --features {feature}")]
+    NotBuilt { path: PathBuf, what: &'static str, feature: &'static str },
+    #[error("{path:?} would be a folder of {count} files: pass --force to write them nevertheless")]
+    ManyFiles { path: PathBuf, count: u64 },
+    #[error(
+        "{root:?} holds an unfinished data set: pass --resume to go on with it, or --force to begin again"
+    )]
+    Unfinished { path: PathBuf, root: PathBuf },
+    #[error("{path:?} holds another data set: {difference}")]
+    Different { path: PathBuf, difference: String },
+    #[error("{path:?} is damaged: {fault}; pass --force to make it again")]
+    Damaged { path: PathBuf, fault: String },
+    #[error("{path:?} is not a data set of this program: it has no manifest")]
+    NotASet { path: PathBuf },
+    #[error("cannot use the manifest {path:?}: {reason}")]
+    Manifest { path: PathBuf, reason: String },
+    #[error("{path:?} is not complete: {done} of {chunks} chunks are done")]
+    Incomplete { path: PathBuf, done: u64, chunks: u64 },
 }
 
 impl Format {
+    /// The names that tell formats apart.
+    const EXTENSIONS: &str = ".npy, .npz, .csv, .h5, .mat, .parquet or .zarr";
+
     /// The format that the extension of `path` names.
     pub fn of(path: &Path) -> Result<Format, OutputError> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("npy") => Ok(Format::Npy),
+            Some("npz") => Ok(Format::Npz),
             Some("csv") => Ok(Format::Csv),
+            Some("h5" | "hdf5") => Ok(Format::Hdf5),
+            Some("mat") => Ok(Format::Mat),
+            Some("parquet") => Ok(Format::Parquet),
+            Some("zarr") => Ok(Format::Zarr),
+            Some("spd") => Ok(Format::Spd),
             _ => Err(OutputError::UnknownFormat { path: path.to_owned() }),
         }
     }
 
-    /// Writes what comes before `count` spectra on `grid`.
-    pub fn begin(self, to: &mut dyn Write, grid: Grid, count: u64) -> io::Result<()> {
-        match self {
-            Format::Npy => npy::begin(to, grid, count),
-            Format::Csv => csv::begin(to, grid),
-        }
-    }
-
-    /// Writes a batch of spectra.
-    pub fn write(self, to: &mut dyn Write, batch: &Batch) -> io::Result<()> {
-        match self {
-            Format::Npy => npy::write(to, batch),
-            Format::Csv => csv::write(to, batch),
-        }
-    }
-}
-
-/// Bytes on their way to a name: in a temporary file beside it until [`Pending::finish`], and gone if that never
-/// comes.
-#[derive(Debug)]
-pub struct Pending {
-    file: BufWriter<NamedTempFile>,
-    path: PathBuf,
-    existing: Existing,
-}
-
-/// What to do where a file of the name exists.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Existing {
-    /// Refuse.
-    Keep,
-    /// Replace it, once the new one is complete.
-    Replace,
-}
-
-impl Pending {
-    /// Begins a file that will appear as `path`.
-    pub fn create(path: &Path, existing: Existing) -> Result<Pending, OutputError> {
+    /// An error where the format cannot hold what a schema says, or was left out of this build.
+    pub fn check(self, path: &Path, schema: &Schema) -> Result<(), OutputError> {
         let path = path.to_owned();
-        if path.is_dir() {
-            return Err(OutputError::Folder { path });
+        let built = match self {
+            Format::Hdf5 | Format::Mat => (cfg!(feature = "hdf5"), "HDF5", "hdf5"),
+            Format::Parquet => (cfg!(feature = "parquet"), "Parquet", "parquet"),
+            _ => (true, "", ""),
+        };
+        if let (false, what, feature) = built {
+            return Err(OutputError::NotBuilt { path, what, feature });
         }
-        if path.exists() && !path.is_file() {
-            return Err(OutputError::Special { path }); // a device, say: --force -o /dev/null must not replace it
+        let one = schema.fields.len() == 1;
+        let shares = !schema.constants.is_empty();
+        let halves = schema.fields.iter().any(|field| field.stored == Element::F16);
+        let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
+        match self {
+            Format::Npy | Format::Csv | Format::Parquet | Format::Spd if shares => {
+                cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
+            }
+            Format::Npy if !one => {
+                cannot(".npy", "one array", "ask for one quantity, or name it .npz, .zarr, .h5 or .parquet")
+            }
+            Format::Spd if !(one && schema.fields[0].axis.as_deref() == Some("wavelength")) => {
+                cannot(".spd", "spectra", "ask for those alone")
+            }
+            Format::Mat if halves => cannot(".mat", "f32 and f64", "choose one with --dtype"),
+            Format::Parquet if halves => cannot(".parquet", "f32 and f64", "choose one with --dtype"),
+            _ => Ok(()),
         }
-        if existing == Existing::Keep && path.symlink_metadata().is_ok() {
-            return Err(OutputError::Exists { path });
+    }
+}
+
+impl Layout {
+    /// An error where the layout cannot hold what a schema says, or was left out of this build.
+    pub fn check(self, path: &Path, schema: &Schema) -> Result<(), OutputError> {
+        match self {
+            Layout::Zarr { zstd: Some(_) } if !cfg!(feature = "zstd") => {
+                Err(OutputError::NotBuilt { path: path.to_owned(), what: "Zstandard", feature: "zstd" })
+            }
+            Layout::Zarr { .. } | Layout::Npy => Ok(()),
+            Layout::Parquet => Format::Parquet.check(path, schema),
         }
-        let folder = folder(&path);
-        if !folder.is_dir() {
-            return Err(OutputError::NoFolder { folder: folder.to_owned() });
-        }
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".spectroll-").suffix(".partial");
-        #[cfg(unix)] // as any new file; by default only its owner could read it
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        match builder.tempfile_in(folder) {
-            Ok(file) => Ok(Pending { file: BufWriter::new(file), path, existing }),
-            Err(source) => Err(OutputError::Write { path, source }),
-        }
+    }
+}
+
+/// What turns windows of columns into the bytes of one file.
+trait Encoder {
+    /// Takes the next window.
+    fn write(&mut self, columns: &[&[u8]]) -> io::Result<()>;
+
+    /// Ends the file.
+    fn finish(self: Box<Self>) -> io::Result<()>;
+}
+
+/// A file that appears under its name only when it is complete.
+pub struct FileWriter {
+    encoder: Box<dyn Encoder>,
+    pending: Pending,
+}
+
+impl FileWriter {
+    /// Begins a file that will appear as `path`. The format is one of those of a single file.
+    pub fn create(
+        path: &Path,
+        format: Format,
+        schema: &Schema,
+        existing: Existing,
+    ) -> Result<FileWriter, OutputError> {
+        format.check(path, schema)?;
+        let pending = Pending::create(path, existing)?;
+        let encoder = encoder(format, schema, &pending).map_err(|e| pending.failed(e))?;
+        Ok(FileWriter { encoder, pending })
+    }
+
+    /// Takes the next draws: a column for each field of the schema.
+    pub fn write(&mut self, columns: &[&[u8]]) -> Result<(), OutputError> {
+        self.encoder.write(columns).map_err(|e| self.pending.failed(e))
     }
 
     /// Makes the file appear under its name, complete and on disk.
     pub fn finish(self) -> Result<(), OutputError> {
-        let Pending { file, path, existing } = self;
-        let failed = |source| OutputError::Write { path: path.clone(), source };
-        let file = file.into_inner().map_err(|e| failed(e.into_error()))?;
-        file.as_file().sync_all().map_err(failed)?;
-        match existing {
-            Existing::Keep => file.persist_noclobber(&path), // nobody's file that appeared meanwhile
-            Existing::Replace => file.persist(&path),
+        match self.encoder.finish() {
+            Ok(()) => self.pending.finish(),
+            Err(e) => Err(self.pending.failed(e)),
         }
-        .map_err(|e| failed(e.error))?;
-        // The name is on disk once the folder is. Not every file system can say so, and the data are safe either way.
-        let _ = File::open(folder(&path)).and_then(|folder| folder.sync_all());
-        Ok(())
-    }
-
-    /// An error of writing, with the name that was being written.
-    pub fn failed(&self, source: io::Error) -> OutputError {
-        OutputError::Write { path: self.path.clone(), source }
     }
 }
 
-impl Write for Pending {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
+fn encoder(format: Format, schema: &Schema, pending: &Pending) -> io::Result<Box<dyn Encoder>> {
+    let file = pending.file().map_err(|e| match e {
+        OutputError::Write { source, .. } => source,
+        other => io::Error::other(other),
+    })?;
+    Ok(match format {
+        Format::Npy => Box::new(npy::Npy::begin(file, schema)?),
+        Format::Npz => Box::new(npz::Npz::begin(file, schema)?),
+        Format::Csv => Box::new(csv::Csv::begin(BufWriter::new(file), schema)?),
+        #[cfg(feature = "hdf5")]
+        Format::Hdf5 => Box::new(h5::Hdf5::begin(pending.temporary_path(), schema)?),
+        #[cfg(feature = "hdf5")]
+        Format::Mat => Box::new(mat::Mat::begin(pending.temporary_path(), schema)?),
+        #[cfg(feature = "parquet")]
+        Format::Parquet => Box::new(parquet::Parquet::begin(file, schema)?),
+        _ => unreachable!("the others are no single files, or were refused by Format::check"),
+    })
 }
 
-/// Writes a whole file, which appears only when it is complete.
-pub fn write_file(path: &Path, existing: Existing, bytes: &[u8]) -> Result<(), OutputError> {
-    let mut pending = Pending::create(path, existing)?;
-    pending.write_all(bytes).map_err(|e| pending.failed(e))?;
-    pending.finish()
-}
+/// CSV on its way to something that is no file, such as standard output.
+pub struct CsvWriter(Box<dyn Encoder>);
 
-/// The folder that a path names a file in.
-fn folder(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+impl CsvWriter {
+    /// Begins with the header.
+    pub fn new(to: impl io::Write + 'static, schema: &Schema) -> io::Result<CsvWriter> {
+        Ok(CsvWriter(Box::new(csv::Csv::begin(to, schema)?)))
+    }
+
+    /// Takes the next draws: a column for each field of the schema.
+    pub fn write(&mut self, columns: &[&[u8]]) -> io::Result<()> {
+        self.0.write(columns)
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
 
     #[test]
-    fn a_file_appears_only_when_it_is_complete() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("x.csv");
-        let files = || fs::read_dir(folder.path()).unwrap().count();
-        {
-            let mut pending = Pending::create(&path, Existing::Keep).unwrap();
-            pending.write_all(b"half").unwrap();
-            assert!(!path.exists());
-        }
-        assert_eq!(files(), 0);
-        write_file(&path, Existing::Keep, b"whole").unwrap();
-        assert_eq!((fs::read(&path).unwrap(), files()), (b"whole".to_vec(), 1));
-        assert!(matches!(write_file(&path, Existing::Keep, b"new"), Err(OutputError::Exists { .. })));
-        write_file(&path, Existing::Replace, b"new").unwrap();
-        assert_eq!((fs::read(&path).unwrap(), files()), (b"new".to_vec(), 1));
+    fn formats_are_known_by_their_names() {
+        assert_eq!(Format::of(Path::new("a/b.NPY")).unwrap(), Format::Npy);
+        assert_eq!(Format::of(Path::new("b.zarr/")).unwrap(), Format::Zarr);
+        assert!(Format::of(Path::new("x.xlsx")).unwrap_err().to_string().contains(".npy, .npz, .csv"));
     }
 
     #[test]
-    fn what_is_in_the_way_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let error = |path: &Path| Pending::create(path, Existing::Keep).unwrap_err().to_string();
-        assert!(error(folder.path()).contains("is a folder"));
-        assert!(error(&folder.path().join("a/b.npy")).contains("does not exist: create it first"));
-        assert!(Format::of(Path::new("x.xlsx")).unwrap_err().to_string().contains(".npy or .csv"));
+    fn what_a_format_cannot_hold_is_refused() {
+        let spectra = Field::vector("spectra", "wavelength", 31, Element::F32);
+        let lrv = Field::scalar("lrv", Element::F32);
+        let schema = |fields: &[&Field]| Schema {
+            fields: fields.iter().copied().cloned().collect(),
+            row: "draw".to_owned(),
+            constants: Vec::new(),
+            count: 1,
+            wavelengths: vec![400.0; 31],
+            attributes: serde_json::Map::new(),
+        };
+        let error = |format: Format, schema: &Schema| {
+            format.check(Path::new("x"), schema).err().map(|e| e.to_string()).unwrap_or_default()
+        };
+        assert!(error(Format::Npy, &schema(&[&spectra, &lrv])).contains("hold one array"));
+        assert!(error(Format::Spd, &schema(&[&lrv])).contains("hold spectra"));
+        let shares = !schema.constants.is_empty();
+        let halves = schema(&[&spectra.clone().stored_as(Element::F16)]);
+        assert_eq!(error(Format::Npy, &halves), "");
+        #[cfg(feature = "hdf5")]
+        assert!(error(Format::Mat, &halves).contains("--dtype"));
     }
 }

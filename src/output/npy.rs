@@ -1,23 +1,58 @@
-//! NumPy's `.npy`: float32, (draws, bands), C order. The `npyz` crate writes the header; what follows is the bytes of
-//! the spectra as they are.
+//! NumPy's `.npy`: one array, C order. The `npyz` crate writes the header; what follows is the bytes as they are.
 
 use std::io::{self, Write};
 
 use npyz::WriterBuilder;
 
-use crate::engine::Batch;
-use crate::grid::Grid;
+use super::Encoder;
+use super::schema::{Field, Schema};
+use crate::quantity::Element;
 
-pub(super) fn begin(to: &mut dyn Write, grid: Grid, count: u64) -> io::Result<()> {
-    let dtype = npyz::DType::Plain("<f4".parse().expect("it is one of NumPy's types"));
-    let options = npyz::WriteOptions::new_header_only();
-    options.dtype(dtype).shape(&[count, grid.len() as u64]).writer(to).write_header_only()?;
-    Ok(())
+pub(super) struct Npy<W> {
+    to: W,
+    field: Field,
 }
 
-pub(super) fn write(to: &mut dyn Write, batch: &Batch) -> io::Result<()> {
-    if cfg!(target_endian = "little") {
-        return to.write_all(bytemuck::cast_slice(batch.spectra()));
+impl<W: Write> Npy<W> {
+    pub(super) fn begin(mut to: W, schema: &Schema) -> io::Result<Self> {
+        let field = schema.only_field().clone();
+        to.write_all(&header(type_string(field.stored), &field.shape(schema.count))?)?;
+        Ok(Npy { to, field })
     }
-    batch.spectra().iter().try_for_each(|value| to.write_all(&value.to_le_bytes()))
+}
+
+impl<W: Write> Encoder for Npy<W> {
+    fn write(&mut self, columns: &[&[u8]]) -> io::Result<()> {
+        let [column] = columns else { unreachable!("the schema has one field") };
+        self.to.write_all(&self.field.store(column))
+    }
+
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+/// A whole small file.
+pub(super) fn file(dtype: &str, shape: &[u64], data: &[u8]) -> io::Result<Vec<u8>> {
+    let header = header(dtype, shape)?;
+    Ok([&header, data].concat())
+}
+
+/// What comes before the data of an array.
+pub(super) fn header(dtype: &str, shape: &[u64]) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let dtype = npyz::DType::Plain(dtype.parse().expect("it is one of NumPy's types"));
+    let options = npyz::WriteOptions::new_header_only();
+    options.dtype(dtype).shape(shape).writer(&mut bytes).write_header_only()?;
+    Ok(bytes)
+}
+
+/// What NumPy's headers call a type.
+pub(super) fn type_string(element: Element) -> &'static str {
+    match element {
+        Element::F16 => "<f2",
+        Element::F32 => "<f4",
+        Element::F64 => "<f8",
+        Element::U32 => "<u4",
+    }
 }

@@ -7,7 +7,7 @@ use crate::cpu::Kernel;
 use crate::dataset::Kind;
 use crate::level;
 use crate::program::{self, Affine, Program, Tally, Target};
-use crate::recipe::{Recipe, RecipeError};
+use crate::recipe::{Proposal, Recipe, RecipeBuilder, RecipeError};
 use crate::stream::Stream;
 
 use super::error::Problem;
@@ -62,12 +62,20 @@ impl Aimed {
         match &targets.aim {
             Aim::Lrv(levels) => {
                 // The lightest is the hardest to accept, for what is within bounds there is within them at all levels.
-                let recipe = built(builder.clone().lrv(levels.largest()).build())?;
-                let at = |lrv: f64| {
-                    let target = recipe.program().target.clone().map(|target| Target { lrv, ..target });
-                    Kernel::new(&Program { target, ..recipe.program().clone() })
+                // What proposes for one level need not do for another, unless it is the model's own Gaussian.
+                let largest = match levels {
+                    Levels::Each(_) => builder.clone(),
+                    Levels::Uniform(..) => builder.clone().proposal(Proposal::Plain),
                 };
+                let recipe = built(largest.lrv(levels.largest()).build())?;
                 let kernel = Kernel::new(recipe.program());
+                let at = |lrv: f64| {
+                    if recipe.program().proposal.is_some() {
+                        return built(builder.clone().lrv(lrv).build()).map(|r| Kernel::new(r.program()));
+                    }
+                    let target = recipe.program().target.clone().map(|target| Target { lrv, ..target });
+                    Ok(Kernel::new(&Program { target, ..recipe.program().clone() }))
+                };
                 Ok(match (levels, targets.copies) {
                     (levels, Copies::SameShape) => {
                         let shapes = 0..u64::from(stream.row());
@@ -78,7 +86,7 @@ impl Aimed {
                         Aimed::Rounds { kernel, levels: levels.clone() }
                     }
                     (Levels::Each(levels), Copies::Independent) => Aimed::Levels {
-                        kernels: levels.iter().map(|&lrv| at(lrv)).collect(),
+                        kernels: levels.iter().map(|&lrv| at(lrv)).collect::<Result<_, _>>()?,
                         levels: levels.clone(),
                     },
                     (&Levels::Uniform(low, high), _) => Aimed::Uniform {
@@ -96,6 +104,7 @@ impl Aimed {
             Aim::Hue(hue) => {
                 // The colours of a hue are a quadrilateral, and the logarithm of the acceptance is concave over it
                 // (Prékopa 1973), so what can be drawn at its corners can be drawn everywhere in it.
+                let builder = builder.proposal(Proposal::Plain);
                 for level in 0..hue.levels {
                     for (saturation, lightness) in corners(hue) {
                         let xyz = hue.xyz(level, saturation, lightness);
@@ -196,7 +205,7 @@ fn uniform(word: u32) -> f64 {
 }
 
 fn built_condition(
-    builder: &crate::recipe::RecipeBuilder,
+    builder: &RecipeBuilder,
     weights: &Affine,
 ) -> Result<Condition, (&'static str, Problem)> {
     builder.condition(weights).map_err(|e| ("hue", Problem::Recipe(e)))
@@ -220,7 +229,7 @@ fn check(targets: &Targets) -> Result<(), (&'static str, Problem)> {
     match &targets.aim {
         Aim::Lrv(levels) | Aim::Flat(levels) => match levels {
             Levels::Each(levels) => {
-                if !(1..=1_000_000).contains(&levels.len()) {
+                if !(1..=10_000).contains(&levels.len()) {
                     return Err(("lrv", Problem::Levels(levels.len() as u64)));
                 }
                 levels.iter().try_for_each(|&value| level(value))?;

@@ -85,7 +85,7 @@ pub enum Problem {
     DarkMean(f64),
     #[error("{0}: every level must be above 0 and below 1, where 1 is a perfect white")]
     Level(f64),
-    #[error("{0} levels: it takes 1 to 1000000")]
+    #[error("{0} levels: it takes 1 to 10000")]
     Levels(u64),
     #[error("from {from} to {to}: the first must be below the second")]
     Order { from: f64, to: f64 },

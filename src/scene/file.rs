@@ -306,7 +306,7 @@ fn levels(entry: &Entry) -> Result<Levels, Wrong> {
     let to = section.need("to", "{ from = 0.2, to = 0.6, levels = 10 }")?.number()?;
     let count = section.need("levels", "{ from = 0.2, to = 0.6, levels = 10 }")?;
     let levels = count.whole()?;
-    if !(1..=1_000_000).contains(&levels) {
+    if !(1..=10_000).contains(&levels) {
         return Err(count.wrong(Problem::Levels(levels)));
     }
     if levels > 1 && from >= to {

@@ -1,7 +1,8 @@
 //! What is computed of a candidate, in straight lines or in loops.
 //!
 //! Either way the functions are the same, of a candidate's `Normals`, and so is the order of operations:
-//! - `normals(key, index, stream, attempt) -> Normals`: k standard normals;
+//! - `normals(key, index, stream, attempt) -> Normals`: k standard normals; or, of a cover,
+//!   `candidate(key, index, stream, attempt) -> Candidate`;
 //! - `worst(z) -> u32`: the largest `excess` of a band before scaling;
 //! - `factor(z) -> f32`: what scales it to the target, where there is one;
 //! - `is_accepted(z) -> bool`;
@@ -9,7 +10,7 @@
 
 use super::tables::Tables;
 use super::text::{Text, float, list};
-use super::{Form, LOOPED, LUMINANCE};
+use super::{COVER_AT, Form, LOOPED, LUMINANCE, NORMALS};
 use crate::dataset::Kind;
 use crate::level;
 use crate::normal::Real;
@@ -73,20 +74,10 @@ fn unrolled(program: &Program) -> Text {
     let (n, k) = (program.bands(), program.components());
     let mut text = Text::default();
     text.line(&format!("alias Normals = array<f32, {k}>;"));
-    text.block(
-        "fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Normals",
-        |body| {
-            for block in 0..k.div_ceil(4) {
-                body.line(&format!("let w{block} = philox(vec4(index, attempt, stream | {block}u), key);"));
-            }
-            for pair in 0..k.div_ceil(2) {
-                let [x, y] = if pair % 2 == 0 { ["x", "y"] } else { ["z", "w"] };
-                body.line(&format!("let p{pair} = normal_pair(w{0}.{x}, w{0}.{y});", pair / 2));
-            }
-            let normal = |j| format!("p{}.{}", j / 2, if j % 2 == 0 { "x" } else { "y" });
-            body.line(&format!("return Normals({});", list(k, normal)));
-        },
-    );
+    match &program.proposal {
+        Some(proposal) => text.line(&proposal.rounded::<f32>().text(k, COVER_AT)),
+        None => normals(&mut text, k),
+    }
     text.line("");
     forms(&mut text, "band", &program.spectrum);
     text.block("fn worst(z: Normals) -> u32", |body| {
@@ -113,6 +104,23 @@ fn unrolled(program: &Program) -> Text {
     text
 }
 
+fn normals(text: &mut Text, k: usize) {
+    text.block(
+        "fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Normals",
+        |body| {
+            for block in 0..k.div_ceil(4) {
+                body.line(&format!("let w{block} = philox(vec4(index, attempt, stream | {block}u), key);"));
+            }
+            for pair in 0..k.div_ceil(2) {
+                let [x, y] = if pair % 2 == 0 { ["x", "y"] } else { ["z", "w"] };
+                body.line(&format!("let p{pair} = normal_pair(w{0}.{x}, w{0}.{y});", pair / 2));
+            }
+            let normal = |j| format!("p{}.{}", j / 2, if j % 2 == 0 { "x" } else { "y" });
+            body.line(&format!("return Normals({});", list(k, normal)));
+        },
+    );
+}
+
 /// A function of the normals for each value of a map: its name is `name` and the value's number. Gains of 0 are left
 /// out, which changes no sum: an offset of -0 is rounded to 0.
 fn forms(text: &mut Text, name: &str, map: &Affine) {
@@ -132,6 +140,11 @@ fn looped(program: &Program, tables: &Tables) -> Text {
     }
     text.line("");
     text.0 += LOOPED;
+    text.line("");
+    match &program.proposal {
+        Some(proposal) => text.0 += &proposal.rounded::<f32>().text(4 * k.div_ceil(4), COVER_AT),
+        None => text.0 += NORMALS,
+    }
     if program.target.is_some() {
         text.line("");
         text.0 += &LUMINANCE.replace("LRV_WEIGHTS", &format!("{}u", tables.lrv_weights));

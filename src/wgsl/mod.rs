@@ -20,7 +20,7 @@ use arithmetic::arithmetic;
 use store::store;
 
 use crate::program::{Level, Program};
-use crate::quantity::Element;
+use crate::quantity::{Element, Quantity};
 
 /// Threads a workgroup.
 pub(crate) const WORKGROUP: u32 = 64;
@@ -34,6 +34,9 @@ pub(crate) const TABLES_AT: u32 = 1;
 /// The binding of the first quantity; that of another is its number more.
 pub(crate) const OUTPUTS_AT: u32 = 2;
 
+/// The binding of a cover's boxes.
+pub(crate) const COVER_AT: u32 = OUTPUTS_AT + Quantity::ALL.len() as u32;
+
 /// The most gains (bands x components) that are written out as constants. At this size lavapipe takes 2.5 s to
 /// compile the straight lines, which then run 7 times as fast as the loop: they pay from 2e5 draws on.
 const UNROLLED_GAINS: usize = 2048;
@@ -45,6 +48,7 @@ const NORMAL: &str = include_str!("../../shaders/normal.wgsl");
 const LEVEL: &str = include_str!("../../shaders/level.wgsl");
 const PHYSICAL: &str = include_str!("../../shaders/physical.wgsl");
 const LOOPED: &str = include_str!("../../shaders/looped.wgsl");
+const NORMALS: &str = include_str!("../../shaders/normals.wgsl");
 const LUMINANCE: &str = include_str!("../../shaders/luminance.wgsl");
 const DRAW: &str = include_str!("../../shaders/draw.wgsl");
 const PARAMETERS: &str = include_str!("../../shaders/parameters.wgsl");
@@ -124,13 +128,16 @@ pub(crate) fn shader(program: &Program, target: Target) -> (String, Tables) {
 
 /// The functions that make a draw, down to `draw_of`.
 fn functions(program: &Program, tables: &Tables, target: Target) -> String {
-    let draw: String = match program.scales() {
-        true => DRAW.to_owned(),
-        false => DRAW
-            .lines()
-            .filter(|line| !line.contains("scale") && !line.contains("multiplies"))
-            .fold(String::new(), |text, line| text + line + "\n"),
+    let is = |word: &str| match word {
+        "scaled" => program.scales(),
+        "covered" => program.proposal.is_some(),
+        _ => program.proposal.is_none(),
     };
+    let line = |line: &str| match line.rsplit_once(" // if ") {
+        Some((line, word)) => is(word).then(|| line.to_owned() + "\n"),
+        None => Some(line.to_owned() + "\n"),
+    };
+    let draw: String = DRAW.lines().filter_map(line).collect();
     let mut parts = vec![generator(target), PHYSICAL.to_owned()];
     if let Some(Level::LogUniform { .. }) = program.level {
         parts.push(LEVEL.to_owned());
@@ -146,7 +153,7 @@ mod tests {
     use super::*;
     use crate::dataset::Kind;
     use crate::program::{self, Affine, Bounds, Output, Source, Unit};
-    use crate::quantity::{Format, Layout, Quantity};
+    use crate::quantity::{Format, Layout};
 
     /// A program of 3 bands and 2 components, small enough to read.
     fn small(kind: Kind, target: Option<(f64, Bounds)>) -> Program {
@@ -163,7 +170,7 @@ mod tests {
         };
         let outputs = vec![Output { format: Format::spectra(bands), source: Source::Spectrum }];
         let target = target.map(|(lrv, bounds)| program::Target { lrv, weights, bounds });
-        Program { kind, spectrum, target, level: None, max_attempts: 100, outputs }.tallied()
+        Program { kind, spectrum, target, level: None, proposal: None, max_attempts: 100, outputs }.tallied()
     }
 
     /// The program with all that can come out of it, so laid.

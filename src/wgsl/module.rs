@@ -20,10 +20,8 @@ pub enum TextError {
          or let a Sampler draw"
     )]
     TooLarge { bands: usize, components: usize },
-    #[error(
-        "intensities of the data are a table, which needs a buffer: ask for log-uniform ones, or let a Sampler draw"
-    )]
-    Table,
+    #[error("{0} are a table, which needs a buffer: do without, or let a Sampler draw")]
+    Table(&'static str),
 }
 
 /// The module of a program.
@@ -37,7 +35,10 @@ pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, TextErro
         return Err(TextError::TooLarge { bands: program.bands(), components: program.components() });
     }
     if let Some(Level::OneOf(_)) = program.level {
-        return Err(TextError::Table);
+        return Err(TextError::Table("intensities of the data"));
+    }
+    if program.proposal.is_some() {
+        return Err(TextError::Table("the boxes that candidates are proposed from"));
     }
     let draw = functions(program, &Tables::default(), Target::Baseline);
     // What naga_oil imports may name structures, but no other types.

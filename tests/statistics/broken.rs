@@ -2,9 +2,8 @@
 //! Without a fault its draws are the library's in f64.
 
 use nalgebra::{DMatrix, DVector};
+use spectroll::statistics::{Draw, Scenario};
 use spectroll::{Bounds, Kind, Real, Stream, colorimetry, philox};
-
-use crate::sample::{Draw, Scenario};
 
 /// What is wrong with a sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,15 +6,18 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand_philox::{Philox, u32_to_unit_f64};
 use rayon::prelude::*;
-use spectroll::{Bounds, Kind, colorimetry};
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::sample::{Draw, Sample, Scenario};
+use super::sample::{Draw, Sample, Scenario};
+use crate::colorimetry;
+use crate::dataset::Kind;
+use crate::program::Bounds;
 
 /// Draws that share a generator.
 const CHUNK: u64 = 1024;
 
-pub(crate) fn sample(scenario: &Scenario, seed: u64, count: u64) -> Sample<'_> {
+/// `count` draws of a scenario.
+pub fn sample(scenario: &Scenario, seed: u64, count: u64) -> Sample<'_> {
     let oracle = Oracle::new(scenario);
     let draws: Vec<_> = (0..count.div_ceil(CHUNK))
         .into_par_iter()

@@ -1,12 +1,12 @@
 //! A model made by hand that has what no fit gives: a mean of the weights other than zero, and a full covariance of
 //! deficient rank.
 
+use crate::model::{Model, Parts};
 use nalgebra::DMatrix;
-use spectroll::{Model, Parts};
 
 /// The built-in reflectances with two of their components gone, the other four turned into all six weights, and a
 /// mean that favours one side of each.
-pub(crate) fn tinted() -> Model {
+pub fn tinted() -> Model {
     let parts = Model::builtin("munsell-vrhel").expect("it is built in").parts().clone();
     let k = parts.basis.nrows();
     let turn = DMatrix::from_fn(k, k, |i, j| ((7 * i + 3 * j * j + 1) as f64).sin()).qr().q();

@@ -1,28 +1,39 @@
 //! Scenarios, which are what is drawn, and samples, which are what came of it.
 
 use rayon::prelude::*;
-use spectroll::{Bounds, Choice, Engine, EngineError, Kind, Model, Recipe, Stream};
 
-use crate::tinted::tinted;
+use super::tinted::tinted;
+use crate::dataset::Kind;
+use crate::engine::{Batch, Engine, EngineError};
+use crate::model::Model;
+use crate::normal::Real;
+use crate::program::{Bounds, Tally};
+use crate::recipe::Recipe;
+use crate::stream::Stream;
 
 /// A model under a rule.
-pub(crate) struct Scenario {
-    pub(crate) name: &'static str,
-    pub(crate) model: Model,
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// What it is called.
+    pub name: String,
+    /// What is drawn from.
+    pub model: Model,
     /// The target LRV, and what must be physical.
-    pub(crate) target: Option<(f64, Bounds)>,
+    pub target: Option<(f64, Bounds)>,
     /// What multiplies the covariance.
-    pub(crate) scale: f64,
+    pub scale: f64,
 }
 
 /// Small enough that no candidate is ever rejected: the weights are as normal as they were drawn.
 const UNTRUNCATED: f64 = 0.01;
 
 impl Scenario {
-    pub(crate) fn all() -> Vec<Scenario> {
+    /// Every kind of recipe, on the built-in models and on one that has what no fit gives.
+    pub fn all() -> Vec<Scenario> {
         let reflectances = || Model::builtin("munsell-vrhel").expect("it is built in");
         let daylights = Model::builtin("granada").expect("it is built in");
-        let scenario = |name, model, target, scale| Scenario { name, model, target, scale };
+        let scenario =
+            |name: &str, model, target, scale| Scenario { name: name.to_owned(), model, target, scale };
         vec![
             scenario("untruncated", reflectances(), None, UNTRUNCATED),
             scenario("untruncated, tinted", tinted(), None, UNTRUNCATED),
@@ -37,11 +48,13 @@ impl Scenario {
         ]
     }
 
-    pub(crate) fn named(name: &str) -> Scenario {
+    /// The one of that name among all.
+    pub fn named(name: &str) -> Scenario {
         Scenario::all().into_iter().find(|s| s.name == name).expect("there is a scenario of that name")
     }
 
-    pub(crate) fn recipe(&self) -> Recipe {
+    /// What to draw with.
+    pub fn recipe(&self) -> Recipe {
         let recipe = Recipe::new(&self.model).covariance_scale(self.scale);
         let recipe = match self.target {
             Some((lrv, bounds)) => recipe.lrv(lrv).bounds(bounds),
@@ -50,12 +63,13 @@ impl Scenario {
         recipe.build().expect("the recipe can be drawn")
     }
 
-    pub(crate) fn is_untruncated(&self) -> bool {
+    /// Whether no candidate is rejected.
+    pub fn is_untruncated(&self) -> bool {
         self.scale == UNTRUNCATED
     }
 
     /// What every value of an output is below.
-    pub(crate) fn limit(&self) -> f64 {
+    pub fn limit(&self) -> f64 {
         match (self.model.kind(), self.target) {
             (Kind::Illuminant, _) | (_, Some((_, Bounds::Base))) => f64::INFINITY,
             _ => 1.0,
@@ -64,20 +78,24 @@ impl Scenario {
 }
 
 /// One spectrum, and how many candidates it took.
-pub(crate) type Draw = (Vec<f64>, u32);
+pub type Draw = (Vec<f64>, u32);
 
 /// Draws of a scenario. A series is the values of one band, weight or count over the draws, in order.
 #[derive(Clone)]
-pub(crate) struct Sample<'a> {
-    pub(crate) scenario: &'a Scenario,
-    pub(crate) bands: Vec<Vec<f64>>,
+pub struct Sample<'a> {
+    /// What was drawn.
+    pub scenario: &'a Scenario,
+    /// A series for each band.
+    pub bands: Vec<Vec<f64>>,
     /// The spectra projected onto the model's basis: weights, or where spectra are scaled something linear in them.
-    pub(crate) weights: Vec<Vec<f64>>,
-    pub(crate) attempts: Vec<f64>,
+    pub weights: Vec<Vec<f64>>,
+    /// How many candidates each draw took.
+    pub attempts: Vec<f64>,
 }
 
 impl<'a> Sample<'a> {
-    pub(crate) fn new(scenario: &'a Scenario, draws: &[Draw]) -> Sample<'a> {
+    /// The sample of these draws.
+    pub fn new(scenario: &'a Scenario, draws: &[Draw]) -> Sample<'a> {
         let model = &scenario.model;
         let weights: Vec<_> = draws.par_iter().map(|(spectrum, _)| model.project(spectrum)).collect();
         Sample {
@@ -89,40 +107,54 @@ impl<'a> Sample<'a> {
     }
 
     /// The sample of draws `first`, `first + 1`, ... that `draw` makes one by one.
-    pub(crate) fn of(
-        scenario: &'a Scenario,
-        first: u64,
-        count: u64,
-        draw: impl Fn(u64) -> Draw + Sync,
-    ) -> Self {
+    pub fn of(scenario: &'a Scenario, first: u64, count: u64, draw: impl Fn(u64) -> Draw + Sync) -> Self {
         let draws: Vec<_> = (0..count).into_par_iter().map(|i| draw(first + i)).collect();
         Sample::new(scenario, &draws)
     }
 
-    /// The draws of the f32 engine.
-    pub(crate) fn of_engine(scenario: &'a Scenario, stream: Stream, first: u64, count: u64) -> Sample<'a> {
-        let engine = Engine::new(&Choice::Cpu).expect("the CPU is always there");
+    /// The draws of an engine.
+    pub fn of_engine(
+        scenario: &'a Scenario,
+        engine: &Engine,
+        stream: Stream,
+        first: u64,
+        count: u64,
+    ) -> Result<Sample<'a>, EngineError> {
         let mut draws = Vec::new();
-        let made = engine.draw(&scenario.recipe(), stream.draws(first..first + count), |batch| {
-            let rows = batch.spectra().chunks_exact(scenario.model.bands()).zip(batch.tallies());
-            draws.extend(rows.map(|(row, t)| (row.iter().map(|&s| f64::from(s)).collect(), t.attempts())));
+        engine.draw(&scenario.recipe(), stream.draws(first..first + count), |batch| {
+            draws.extend(rows(&batch).map(|(row, tally)| {
+                let spectrum = row.iter().map(|&s| f64::from(s)).collect();
+                (spectrum, tally.attempts())
+            }));
             Ok::<_, EngineError>(())
-        });
-        made.expect("every draw succeeds");
-        Sample::new(scenario, &draws)
+        })?;
+        Ok(Sample::new(scenario, &draws))
     }
 
     /// The f64 draws of the library.
-    pub(crate) fn of_library(scenario: &'a Scenario, stream: Stream, first: u64, count: u64) -> Sample<'a> {
+    pub fn of_library(scenario: &'a Scenario, stream: Stream, first: u64, count: u64) -> Sample<'a> {
         let recipe = scenario.recipe();
         Sample::of(scenario, first, count, |index| {
-            let drawn = recipe.draw::<f64>(stream, index);
-            (drawn.spectrum().to_vec(), drawn.tally().attempts())
+            let (spectrum, tally) = exact(&recipe, stream, index);
+            (spectrum, tally.attempts())
         })
     }
 
     /// How many draws there are.
-    pub(crate) fn len(&self) -> usize {
+    #[allow(clippy::len_without_is_empty)] // nobody samples nothing
+    pub fn len(&self) -> usize {
         self.attempts.len()
     }
+}
+
+/// The draws of a batch: the spectrum of each, and what it took.
+pub(crate) fn rows<'b>(batch: &'b Batch) -> impl Iterator<Item = (&'b [f32], Tally)> {
+    let bands = batch.formats()[0].width;
+    batch.spectra().chunks_exact(bands).zip(batch.tallies().iter().copied())
+}
+
+/// A draw on the CPU: in f64 without the rounding errors of f32, or in another arithmetic.
+pub(crate) fn exact<R: Real>(recipe: &Recipe, stream: Stream, index: u64) -> (Vec<R>, Tally) {
+    let drawn = recipe.draw(stream, index);
+    (drawn.spectrum().to_vec(), drawn.tally())
 }

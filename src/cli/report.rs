@@ -1,0 +1,171 @@
+//! `spectroll report`: what draws cost, how good they are and how they behave at the edges, as a page to keep.
+
+use std::cell::RefCell;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::anyhow;
+use indicatif::{ProgressBar, ProgressStyle};
+use spectroll::report::{Effort, Options, Report, ReportError, figures, measure, page};
+use spectroll::{Choice, adapters};
+
+use super::{EngineArguments, Interrupted, Usage, check_interrupt, model, watch_interrupts};
+
+/// Measure error against run time, accuracy, randomness and extreme cases, as a page with plots
+///
+/// Writes a folder: report.html, which needs nothing else, report.json with all numbers, and the plots as SVG.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Model files, or names of built-in models
+    #[arg(value_name = "MODEL", default_value = "munsell-vrhel")]
+    models: Vec<String>,
+    /// The folder to make
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Up to 10^6 draws: under a minute on 2 cores
+    #[arg(long, conflicts_with = "full")]
+    quick: bool,
+    /// Up to 10^8 draws: the better part of an hour
+    #[arg(long)]
+    full: bool,
+    /// The seed of all random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    engine: EngineArguments,
+    /// Replace the folder if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let models = arguments.models.iter().map(|name| Ok((name.clone(), model(name)?)));
+    let models = models.collect::<anyhow::Result<_>>()?;
+    if arguments.engine.threads.is_some() {
+        return Err(Usage("a report uses all cores: leave out --threads".to_owned()).into());
+    }
+    let folder = Folder::create(&arguments.output, arguments.force)?;
+    let options = Options {
+        models,
+        engines: engines(arguments.engine.choice()),
+        effort: match (arguments.quick, arguments.full) {
+            (true, _) => Effort::Quick,
+            (_, true) => Effort::Full,
+            _ => Effort::Usual,
+        },
+        seed: arguments.seed,
+    };
+    watch_interrupts();
+    let report = watched(&options)?;
+    write(&folder, &report)?;
+    check_interrupt()?;
+    folder.finish()?;
+    let mut out = std::io::stdout().lock();
+    write!(out, "{}", report.summary())?;
+    writeln!(out, "{}, {:.0} s", arguments.output.join("report.html").display(), report.seconds)?;
+    if report.verdict().is_good() {
+        return Ok(());
+    }
+    anyhow::bail!("something is wrong: see above, and the page")
+}
+
+/// Every adapter and the CPU, unless one was asked for.
+fn engines(choice: Option<Choice>) -> Vec<Choice> {
+    match choice {
+        Some(choice) => vec![choice],
+        None => {
+            let adapters = (0..adapters().len()).map(|i| Choice::Adapter(i.to_string()));
+            [Choice::Cpu].into_iter().chain(adapters).collect()
+        }
+    }
+}
+
+/// Measures, and says on a terminal what is being measured.
+fn watched(options: &Options) -> anyhow::Result<Report> {
+    let style =
+        ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}").expect("the template is right");
+    let bar = ProgressBar::new_spinner().with_style(style);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let last = RefCell::new(String::new());
+    let result = measure(options, &|what| {
+        if !what.is_empty() && *last.borrow() != what {
+            bar.set_message(what.to_owned());
+            last.replace(what.to_owned());
+        }
+        check_interrupt().is_ok()
+    });
+    bar.finish_and_clear();
+    match result {
+        Err(ReportError::Stopped) => Err(Interrupted("nothing was left behind".to_owned()).into()),
+        Err(ReportError::Engine(e)) => Err(e.into()), // with its exit code
+        Err(ReportError::Recipe(e)) => Err(e.into()),
+        other => Ok(other?),
+    }
+}
+
+fn write(folder: &Folder, report: &Report) -> anyhow::Result<()> {
+    let figures = figures(report);
+    folder.write("report.html", &page(report, &figures))?;
+    folder.write("report.json", &serde_json::to_string_pretty(report)?)?;
+    for figure in figures {
+        folder.write(&format!("{}.svg", figure.name), &figure.svg)?;
+    }
+    Ok(())
+}
+
+/// A folder that appears under its name only when it is complete.
+struct Folder {
+    making: tempfile::TempDir,
+    path: PathBuf,
+    force: bool,
+}
+
+/// What tells a folder of ours from others, which `--force` must not remove.
+const MARK: &str = "report.json";
+
+impl Folder {
+    fn create(path: &Path, force: bool) -> anyhow::Result<Folder> {
+        check(path, force)?;
+        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".spectroll-").suffix(".partial");
+        #[cfg(unix)] // as any new folder; by default only its owner could read it
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+        let making = builder.tempdir_in(parent).map_err(|e| anyhow!("cannot write into {parent:?}: {e}"))?;
+        Ok(Folder { making, path: path.to_owned(), force })
+    }
+
+    fn write(&self, name: &str, text: &str) -> anyhow::Result<()> {
+        let path = self.making.path().join(name);
+        fs::write(&path, text).map_err(|e| anyhow!("cannot write {path:?}: {e}"))
+    }
+
+    fn finish(self) -> anyhow::Result<()> {
+        check(&self.path, self.force)?; // it may have appeared meanwhile
+        if self.path.exists() {
+            fs::remove_dir_all(&self.path).map_err(|e| anyhow!("cannot replace {:?}: {e}", self.path))?;
+        }
+        let making = self.making.keep();
+        let moved = fs::rename(&making, &self.path).map_err(|e| anyhow!("cannot write {:?}: {e}", self.path));
+        if moved.is_err() {
+            let _ = fs::remove_dir_all(making);
+        }
+        moved
+    }
+}
+
+/// Refuses a name that is taken, unless by an earlier report that may be replaced.
+fn check(path: &Path, force: bool) -> anyhow::Result<()> {
+    let is_ours = path.join(MARK).is_file();
+    match (path.symlink_metadata().is_ok(), force) {
+        (true, true) if !is_ours => {
+            Err(anyhow!("{path:?} is not a report, so --force leaves it alone: choose another name"))
+        }
+        (true, false) => {
+            Err(anyhow!("{path:?} exists already: choose another name, or pass --force to replace a report"))
+        }
+        _ => Ok(()),
+    }
+}

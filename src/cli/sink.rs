@@ -1,0 +1,245 @@
+//! Where draws go: what `--output` and the flags beside it name.
+
+use std::io::{self, BufWriter};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use spectroll::Element;
+use spectroll::output::{
+    CsvWriter, FileWriter, Format, Layout, Outcome, OutputError, Plan, Schema, SetWriter, Shard, SpdFolder,
+    SpdName, Start,
+};
+
+use super::shard::ShardName;
+use super::{Interrupted, Usage, count, existing};
+
+/// The flags of what is written.
+#[derive(clap::Args)]
+pub(super) struct OutputArguments {
+    /// Where to: .npy, .npz, .csv, .h5, .mat (MATLAB v7.3), .parquet or .zarr; FOLDER/ with --format npy, parquet or
+    /// spd; - is CSV on standard output
+    #[arg(short, long, value_name = "OUT")]
+    pub(super) output: PathBuf,
+    /// The format [default: what the name says]
+    #[arg(long, value_enum)]
+    format: Option<FormatName>,
+    /// The type of the numbers
+    #[arg(long, value_enum, default_value = "f32")]
+    dtype: TypeName,
+    /// How many draws each chunk of a .zarr or of FOLDER/ has [default: about 16 MiB of them]
+    #[arg(long, value_name = "DRAWS", value_parser = count)]
+    chunk: Option<u64>,
+    /// Pack the chunks of a .zarr with Zstandard [level: 3]
+    #[arg(long, value_name = "LEVEL", num_args = 0..=1, default_missing_value = "3",
+          value_parser = clap::value_parser!(i32).range(1..=22))]
+    zstd: Option<i32>,
+    /// Make only the I-th of N parts of a .zarr or FOLDER/; auto takes them from Slurm's or Kubernetes' variables
+    #[arg(long, value_name = "I/N|auto|auto/N")]
+    shard: Option<ShardName>,
+    /// Go on with a .zarr or FOLDER/ that an earlier run began, if one did
+    #[arg(long)]
+    resume: bool,
+    /// Replace what exists
+    #[arg(long, conflicts_with_all = ["resume", "shard"])]
+    force: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FormatName {
+    /// NumPy, one array
+    Npy,
+    /// NumPy, an array a quantity
+    Npz,
+    /// Text
+    Csv,
+    /// HDF5
+    H5,
+    /// MATLAB v7.3
+    Mat,
+    /// Parquet
+    Parquet,
+    /// Zarr, version 3
+    Zarr,
+    /// A folder of text files, one a spectrum, for renderers
+    Spd,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum TypeName {
+    F16,
+    F32,
+    F64,
+}
+
+/// What kind of thing is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    Stdout,
+    File(Format),
+    Spd,
+    Set(Layout),
+}
+
+impl OutputArguments {
+    pub(super) fn to_stdout(&self) -> bool {
+        self.output == Path::new("-")
+    }
+
+    pub(super) fn element(&self) -> Element {
+        match self.dtype {
+            TypeName::F16 => Element::F16,
+            TypeName::F32 => Element::F32,
+            TypeName::F64 => Element::F64,
+        }
+    }
+
+    /// What the name and the flags mean together.
+    pub(super) fn target(&self) -> anyhow::Result<Target> {
+        let usage = |text: &str| anyhow::Error::from(Usage(text.to_owned()));
+        let format = self.format.map(|format| match format {
+            FormatName::Npy => Format::Npy,
+            FormatName::Npz => Format::Npz,
+            FormatName::Csv => Format::Csv,
+            FormatName::H5 => Format::Hdf5,
+            FormatName::Mat => Format::Mat,
+            FormatName::Parquet => Format::Parquet,
+            FormatName::Zarr => Format::Zarr,
+            FormatName::Spd => Format::Spd,
+        });
+        let is_folder =
+            self.output.as_os_str().as_encoded_bytes().last().is_some_and(|&b| b == b'/' || b == b'\\');
+        let target = match format {
+            Some(Format::Csv) | None if self.to_stdout() => Target::Stdout,
+            Some(_) if self.to_stdout() => return Err(usage("standard output is CSV only")),
+            _ => match format.map_or_else(|| Format::of(&self.output), Ok)? {
+                Format::Zarr => Target::Set(Layout::Zarr { zstd: self.zstd }),
+                Format::Spd => Target::Spd,
+                Format::Npy if is_folder => Target::Set(Layout::Npy),
+                Format::Parquet if is_folder => Target::Set(Layout::Parquet),
+                _ if is_folder => {
+                    return Err(usage("a folder holds parts in --format npy or parquet, or spd files"));
+                }
+                file => Target::File(file),
+            },
+        };
+        if self.zstd.is_some() && !matches!(target, Target::Set(Layout::Zarr { .. })) {
+            return Err(usage("--zstd is for .zarr"));
+        }
+        let of_sets =
+            [("--chunk", self.chunk.is_some()), ("--shard", self.shard.is_some()), ("--resume", self.resume)];
+        if let (false, Some((flag, _))) =
+            (matches!(target, Target::Set(_)), of_sets.iter().find(|(_, given)| *given))
+        {
+            return Err(usage(&format!(
+                "{flag} needs an output of many files: name it .zarr, or FOLDER/ with --format npy or parquet"
+            )));
+        }
+        if self.chunk == Some(0) {
+            return Err(usage("a chunk has at least one draw"));
+        }
+        Ok(target)
+    }
+
+    /// A set of chunks of these draws.
+    pub(super) fn plan(&self, layout: Layout, schema: &Schema) -> Plan {
+        let chunk = self.chunk.unwrap_or_else(|| Layout::default_chunk(schema.row_bytes()));
+        Plan { layout, chunk, schema: schema.clone() }
+    }
+
+    fn start(&self) -> Start {
+        match (self.resume, self.force) {
+            (true, _) => Start::Resume,
+            (_, true) => Start::Again,
+            _ => Start::New,
+        }
+    }
+
+    /// Refuses what the target cannot hold.
+    pub(super) fn check(&self, target: Target, schema: &Schema) -> Result<(), OutputError> {
+        match target {
+            Target::Stdout => Ok(()),
+            Target::File(format) => format.check(&self.output, schema),
+            Target::Spd => Format::Spd.check(&self.output, schema),
+            Target::Set(layout) => layout.check(&self.output, schema),
+        }
+    }
+
+    /// Opens the target. `model` is the text of its file, which lies beside the chunks of a set; `engine` draws.
+    pub(super) fn open(
+        &self,
+        target: Target,
+        schema: &Schema,
+        (name, first): (SpdName, u64),
+        (model, engine): (&str, &str),
+    ) -> anyhow::Result<Sink> {
+        let (path, existing) = (self.output.as_path(), existing(self.force));
+        Ok(match target {
+            Target::Stdout => Sink::Stdout(CsvWriter::new(BufWriter::new(io::stdout()), schema)?),
+            Target::File(format) => Sink::File(FileWriter::create(path, format, schema, existing)?),
+            Target::Spd => Sink::Spd(SpdFolder::create(path, schema, name, first, existing)?),
+            Target::Set(layout) => {
+                let shard = self.shard.map_or(Ok(Shard::WHOLE), ShardName::resolve)?;
+                let plan = self.plan(layout, schema);
+                let companions = [("model.json", model)];
+                let set = SetWriter::open(path, plan, &companions, (shard, self.start()), engine)?;
+                Sink::Set(Box::new(set))
+            }
+        })
+    }
+}
+
+/// Where the draws go.
+pub(super) enum Sink {
+    Stdout(CsvWriter),
+    File(FileWriter),
+    Spd(SpdFolder),
+    Set(Box<SetWriter>),
+}
+
+impl Sink {
+    /// The draws that are wanted, in order, of `count`.
+    pub(super) fn missing(&self, count: u64) -> Vec<Range<u64>> {
+        match self {
+            Sink::Set(set) => set.missing(),
+            _ => std::iter::once(0..count).collect(),
+        }
+    }
+
+    pub(super) fn write(&mut self, columns: &[&[u8]]) -> anyhow::Result<()> {
+        match self {
+            Sink::Stdout(csv) => Ok(csv.write(columns)?),
+            Sink::File(file) => Ok(file.write(columns)?),
+            Sink::Spd(folder) => Ok(folder.write(columns)?),
+            Sink::Set(set) => Ok(set.write(columns)?),
+        }
+    }
+
+    /// Completes what was written. An outcome other than `Sealed` is one of sets.
+    pub(super) fn finish(self) -> anyhow::Result<Outcome> {
+        match self {
+            Sink::Stdout(_) => {} // each window was flushed
+            Sink::File(file) => file.finish()?,
+            Sink::Spd(folder) => folder.finish()?,
+            Sink::Set(set) => return Ok(set.finish()?),
+        }
+        Ok(Outcome::Sealed)
+    }
+
+    /// Keeps what is finished after an error, and adds to it how to go on.
+    pub(super) fn stop(self, error: anyhow::Error) -> anyhow::Error {
+        let Sink::Set(set) = self else { return error };
+        let folder = set.folder().to_owned();
+        let kept = match set.stop() {
+            Ok((done, all)) => {
+                format!("{done} of {all} chunks are finished in {folder:?}: pass --resume to go on")
+            }
+            Err(e) => format!("what is finished is in {folder:?}: pass --resume to go on ({e})"),
+        };
+        if error.is::<Interrupted>() {
+            return Interrupted(kept).into();
+        }
+        let text = format!("{error}; {kept}");
+        error.context(text)
+    }
+}

@@ -1,0 +1,108 @@
+//! A choice of one of many by one random word, with integer odds, so that every engine makes the same one.
+//!
+//! Walker's alias method, by Vose's construction ("A linear algorithm for generating random numbers with a given
+//! distribution", 1991), on integers: the word's top bits choose a column, and the rest choose between the column and
+//! its alias. A choice is made with exactly `odds` in 2^32.
+
+/// The alias table of odds that sum to 2^32.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Alias {
+    /// 2^bits columns; at least 2, since a shift by 32 bits is no shift.
+    pub(crate) bits: u32,
+    pub(crate) columns: Vec<Column>,
+}
+
+/// Chooses itself where the rest of the word, shifted to the top, is below the threshold, and its alias elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Column {
+    pub(crate) threshold: u32,
+    pub(crate) alias: u32,
+}
+
+impl Alias {
+    pub(super) fn new(odds: &[u32]) -> Alias {
+        let bits = odds.len().next_power_of_two().trailing_zeros().max(1);
+        let room = 1u32 << (32 - bits);
+        let mut left = odds.to_vec();
+        left.resize(1 << bits, 0);
+        let mut columns: Vec<_> = (0..left.len() as u32).map(|c| Column { threshold: 0, alias: c }).collect();
+        let (mut small, mut large): (Vec<usize>, Vec<usize>) =
+            (0..left.len()).partition(|&column| left[column] < room);
+        // A small column is filled up by a large one, which may become small by it. The sums match, so both run out
+        // together, but for columns that are full by themselves.
+        while let (Some(poor), Some(&rich)) = (small.pop(), large.last()) {
+            columns[poor] = Column { threshold: left[poor] << bits, alias: rich as u32 };
+            left[rich] -= room - left[poor];
+            if left[rich] < room {
+                large.pop();
+                small.push(rich);
+            }
+        }
+        Alias { bits, columns }
+    }
+
+    /// What a word chooses.
+    #[inline(always)]
+    pub(crate) fn choose(&self, word: u32) -> u32 {
+        let column = word >> (32 - self.bits);
+        let Column { threshold, alias } = self.columns[column as usize];
+        if word << self.bits < threshold { column } else { alias }
+    }
+}
+
+/// Odds that sum to 2^32, in proportion to weights: rounded up, so that nothing is left out, and what rounding adds
+/// to each, as a factor of at least 1. The last number is what a weight of 1 would have got.
+pub(super) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
+    const WORDS: f64 = 4_294_967_296.0;
+    let total: f64 = weights.iter().sum();
+    let scale = (WORDS - weights.len() as f64 - 1.0) / total;
+    let mut odds: Vec<u64> = weights.iter().map(|w| (w * scale).ceil() as u64).collect();
+    let largest = (0..odds.len()).max_by_key(|&i| odds[i]).expect("there are weights");
+    odds[largest] += WORDS as u64 - odds.iter().sum::<u64>();
+    let unit = odds.iter().zip(weights).map(|(&o, w)| o as f64 / w).fold(f64::INFINITY, f64::min);
+    let excess = odds.iter().zip(weights).map(|(&o, w)| o as f64 / (w * unit)).collect();
+    (odds.into_iter().map(|o| o.min(u64::from(u32::MAX)) as u32).collect(), excess, unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How many of all words choose each.
+    fn shares(alias: &Alias) -> Vec<u64> {
+        let room = 1u64 << (32 - alias.bits);
+        let mut shares = vec![0; alias.columns.len()];
+        for (own, column) in alias.columns.iter().enumerate() {
+            let kept = u64::from(column.threshold >> alias.bits);
+            shares[own] += kept;
+            shares[column.alias as usize] += room - kept;
+        }
+        shares
+    }
+
+    #[test]
+    fn every_choice_has_exactly_its_odds() {
+        for count in [2, 3, 4, 5, 1000, 1023, 1024] {
+            let weights: Vec<f64> = (0..count).map(|i| (f64::from(i) * 7.7).sin().powi(8) + 1e-13).collect();
+            let (odds, excess, unit) = odds(&weights);
+            assert_eq!(odds.iter().map(|&o| u64::from(o)).sum::<u64>(), 1 << 32);
+            for ((&odds, excess), weight) in odds.iter().zip(&excess).zip(&weights) {
+                assert!(
+                    odds >= 1
+                        && *excess >= 1.0
+                        && (f64::from(odds) / excess / unit / weight - 1.0).abs() < 1e-12
+                );
+            }
+            let shares = shares(&Alias::new(&odds));
+            assert!(
+                shares.iter().zip(odds.iter().chain(std::iter::repeat(&0))).all(|(&s, &o)| s == u64::from(o))
+            );
+        }
+    }
+
+    #[test]
+    fn one_choice_is_no_choice() {
+        let alias = Alias::new(&odds(&[0.25]).0);
+        assert!([0, 1, 1 << 31, u32::MAX].iter().all(|&word| alias.choose(word) == 0));
+    }
+}

@@ -1,0 +1,187 @@
+//! Files that appear under their names only when they are complete.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use super::OutputError;
+
+/// What the names of temporary files begin with.
+pub(super) const PREFIX: &str = ".spectroll-";
+
+const SUFFIX: &str = ".partial";
+
+/// What to do where something of the name exists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Existing {
+    /// Refuse.
+    Keep,
+    /// Replace it, once the new one is complete.
+    Replace,
+}
+
+/// A file on its way to a name: a temporary one beside it until [`Pending::finish`], and gone if that never comes.
+#[derive(Debug)]
+pub struct Pending {
+    file: NamedTempFile,
+    path: PathBuf,
+    existing: Existing,
+}
+
+impl Pending {
+    /// Begins a file that will appear as `path`.
+    pub fn create(path: &Path, existing: Existing) -> Result<Pending, OutputError> {
+        let path = path.to_owned();
+        if path.is_dir() {
+            return Err(OutputError::Folder { path });
+        }
+        if path.exists() && !path.is_file() {
+            return Err(OutputError::Special { path }); // a device, say: --force -o /dev/null must not replace it
+        }
+        if existing == Existing::Keep && path.symlink_metadata().is_ok() {
+            return Err(OutputError::Exists { path });
+        }
+        match temporary(existing_folder(&path)?, PREFIX) {
+            Ok(file) => Ok(Pending { file, path, existing }),
+            Err(source) => Err(OutputError::Write { path, source }),
+        }
+    }
+
+    /// The file, to write to.
+    pub fn file(&self) -> Result<File, OutputError> {
+        self.file.as_file().try_clone().map_err(|source| self.failed(source))
+    }
+
+    /// The temporary name, for libraries that open files themselves.
+    #[cfg_attr(not(feature = "hdf5"), expect(dead_code))]
+    pub(super) fn temporary_path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// Makes the file appear under its name, complete and on disk.
+    pub fn finish(self) -> Result<(), OutputError> {
+        let Pending { file, path, existing } = self;
+        let failed = |source| OutputError::Write { path: path.clone(), source };
+        file.as_file().sync_all().map_err(failed)?;
+        match existing {
+            Existing::Keep => file.persist_noclobber(&path), // nobody's file that appeared meanwhile
+            Existing::Replace => file.persist(&path),
+        }
+        .map_err(|e| failed(e.error))?;
+        sync_folder(folder(&path));
+        Ok(())
+    }
+
+    /// An error of writing, with the name that was being written.
+    pub fn failed(&self, source: io::Error) -> OutputError {
+        OutputError::Write { path: self.path.clone(), source }
+    }
+}
+
+/// Writes a whole file, which appears only when it is complete.
+pub fn write_file(path: &Path, existing: Existing, bytes: &[u8]) -> Result<(), OutputError> {
+    let pending = Pending::create(path, existing)?;
+    pending.file()?.write_all(bytes).map_err(|e| pending.failed(e))?;
+    pending.finish()
+}
+
+/// Puts a whole file in place, by way of a temporary one beside it: complete whenever it is there, and on disk once
+/// [`sync_folder`] was called as well.
+pub(super) fn place(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    place_by(folder(path), PREFIX, path, bytes)
+}
+
+/// The same, by way of a temporary file in another folder whose name begins with `prefix`.
+pub(super) fn place_by(by: &Path, prefix: &str, path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = temporary(by, prefix)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_data()?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}
+
+/// A new temporary file of ours.
+fn temporary(folder: &Path, prefix: &str) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(prefix).suffix(SUFFIX);
+    #[cfg(unix)] // as any new file; by default only its owner could read it
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+/// Removes the temporary files that killed runs left in a folder, as far as their names begin with `prefix`.
+pub(super) fn sweep(folder: &Path, prefix: &str) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(prefix) && name.ends_with(SUFFIX) {
+            // Another process may have been faster.
+            fs::remove_file(entry.path()).or_else(ignore_missing)?;
+        }
+    }
+    Ok(())
+}
+
+/// What is gone already is not in the way.
+pub(super) fn ignore_missing(error: io::Error) -> io::Result<()> {
+    if error.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(error) }
+}
+
+/// Puts the names in a folder on disk. Not every file system can say so, and the data are safe either way.
+pub(super) fn sync_folder(folder: &Path) {
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}
+
+/// The folder that a path names a file in.
+pub(super) fn folder(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The folder that a path names a file in, which must exist.
+pub(super) fn existing_folder(path: &Path) -> Result<&Path, OutputError> {
+    let folder = folder(path);
+    if folder.is_dir() { Ok(folder) } else { Err(OutputError::NoFolder { folder: folder.to_owned() }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_appears_only_when_it_is_complete() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.csv");
+        let files = || fs::read_dir(folder.path()).unwrap().count();
+        {
+            let pending = Pending::create(&path, Existing::Keep).unwrap();
+            pending.file().unwrap().write_all(b"half").unwrap();
+            assert!(!path.exists());
+        }
+        assert_eq!(files(), 0);
+        write_file(&path, Existing::Keep, b"whole").unwrap();
+        assert_eq!((fs::read(&path).unwrap(), files()), (b"whole".to_vec(), 1));
+        assert!(matches!(write_file(&path, Existing::Keep, b"new"), Err(OutputError::Exists { .. })));
+        write_file(&path, Existing::Replace, b"new").unwrap();
+        assert_eq!((fs::read(&path).unwrap(), files()), (b"new".to_vec(), 1));
+    }
+
+    #[test]
+    fn what_is_in_the_way_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = |path: &Path| Pending::create(path, Existing::Keep).unwrap_err().to_string();
+        assert!(error(folder.path()).contains("is a folder"));
+        assert!(error(&folder.path().join("a/b.npy")).contains("does not exist: create it first"));
+    }
+
+    #[test]
+    fn what_killed_runs_leave_is_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        let left = temporary(folder.path(), PREFIX).unwrap().keep().unwrap().1;
+        fs::write(folder.path().join("mine.partial"), "mine").unwrap();
+        sweep(folder.path(), PREFIX).unwrap();
+        assert!(!left.exists() && folder.path().join("mine.partial").exists());
+    }
+}

@@ -1,0 +1,223 @@
+//! What a data set holds: columns of numbers, a row a draw, whatever they mean.
+
+use std::borrow::Cow;
+
+use half::f16;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::quantity::Element;
+
+/// The value that bytes hold, as f64, which holds every one of these exactly.
+fn read(element: Element, bytes: &[u8]) -> f64 {
+    match element {
+        Element::F16 => f16::from_le_bytes([bytes[0], bytes[1]]).to_f64(),
+        Element::F32 => f32::from_le_bytes(bytes.try_into().expect("four bytes")).into(),
+        Element::F64 => f64::from_le_bytes(bytes.try_into().expect("eight bytes")),
+        Element::U32 => u32::from_le_bytes(bytes.try_into().expect("four bytes")).into(),
+    }
+}
+
+/// One quantity of every draw.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Field {
+    /// Its name, such as `spectra`.
+    pub name: String,
+    /// What its values run over, such as `wavelength`; `None` where a draw has one value, and the array one dimension.
+    pub axis: Option<String>,
+    /// What a draw has several rows of such values of, and how many, such as the surfaces of a scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outer: Option<(String, usize)>,
+    /// How many values a draw has, in all its rows.
+    pub width: usize,
+    /// The type of the values as they are delivered.
+    pub element: Element,
+    /// The type that they are written as.
+    pub stored: Element,
+}
+
+impl Field {
+    /// A quantity of `width` values a draw, over `axis`.
+    pub fn vector(name: &str, axis: &str, width: usize, element: Element) -> Field {
+        Field { width, axis: Some(axis.to_owned()), ..Field::scalar(name, element) }
+    }
+
+    /// A quantity of one value a draw.
+    pub fn scalar(name: &str, element: Element) -> Field {
+        Field { name: name.to_owned(), axis: None, outer: None, width: 1, element, stored: element }
+    }
+
+    /// The same for `count` rows a draw.
+    pub fn repeated(self, outer: &str, count: usize) -> Field {
+        Field { width: self.width * count, outer: Some((outer.to_owned(), count)), ..self }
+    }
+
+    /// The same, written as another type of float where it is one.
+    pub fn stored_as(mut self, stored: Element) -> Field {
+        if self.element != Element::U32 {
+            self.stored = stored;
+        }
+        self
+    }
+
+    /// The bytes of one draw as delivered.
+    pub fn delivered_bytes(&self) -> usize {
+        self.width * self.element.size()
+    }
+
+    /// The bytes of one draw as written.
+    pub fn stored_bytes(&self) -> usize {
+        self.width * self.stored.size()
+    }
+
+    /// The shape of `rows` draws.
+    pub fn shape(&self, rows: u64) -> Vec<u64> {
+        let outer = self.outer.as_ref().map(|(_, count)| *count);
+        let inner = self.axis.as_ref().map(|_| self.width / outer.unwrap_or(1).max(1));
+        std::iter::once(rows).chain(outer.into_iter().chain(inner).map(|n| n as u64)).collect()
+    }
+
+    /// The names of the dimensions, where a row is called `row`.
+    pub fn axes<'a>(&'a self, row: &'a str) -> Vec<&'a str> {
+        let outer = self.outer.as_ref().map(|(name, _)| name.as_str());
+        std::iter::once(row).chain(outer).chain(self.axis.as_deref()).collect()
+    }
+
+    /// Whether a draw has a list of values, rather than one.
+    pub(super) fn is_list(&self) -> bool {
+        self.axis.is_some() || self.outer.is_some()
+    }
+
+    /// Values as delivered, as they are to be written.
+    pub(super) fn store<'a>(&self, bytes: &'a [u8]) -> Cow<'a, [u8]> {
+        if self.element == self.stored {
+            return Cow::Borrowed(bytes);
+        }
+        let values = bytes.chunks_exact(self.element.size());
+        let mut out = Vec::with_capacity(values.len() * self.stored.size());
+        match (self.element, self.stored) {
+            (Element::F32, Element::F16) => values.for_each(|v| {
+                let value = f32::from_le_bytes(v.try_into().expect("four bytes"));
+                out.extend_from_slice(&f16::from_f32(value).to_le_bytes());
+            }),
+            (from, Element::F16) => {
+                values.for_each(|v| out.extend_from_slice(&f16::from_f64(read(from, v)).to_le_bytes()));
+            }
+            (from, Element::F32) => {
+                values.for_each(|v| out.extend_from_slice(&(read(from, v) as f32).to_le_bytes()));
+            }
+            (from, Element::F64) => values.for_each(|v| out.extend_from_slice(&read(from, v).to_le_bytes())),
+            (_, Element::U32) => unreachable!("no float is written as an integer"),
+        }
+        Cow::Owned(out)
+    }
+
+    /// The values of delivered bytes.
+    pub(super) fn values<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = f64> + use<'a> {
+        let element = self.element;
+        bytes.chunks_exact(element.size()).map(move |value| read(element, value))
+    }
+}
+
+/// An array that all draws share.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Constant {
+    /// Its name.
+    pub name: String,
+    /// Its dimensions: their names and extents.
+    pub axes: Vec<(String, u64)>,
+    /// The type of its values.
+    pub element: Element,
+    /// Its values in C order. A set of chunks has them in a file of their own.
+    #[serde(skip)]
+    pub bytes: Vec<u8>,
+}
+
+/// What is made from one description has the same values.
+impl PartialEq for Constant {
+    fn eq(&self, other: &Constant) -> bool {
+        (&self.name, &self.axes, self.element) == (&other.name, &other.axes, other.element)
+    }
+}
+
+impl Constant {
+    /// The extents of its dimensions.
+    pub(super) fn shape(&self) -> Vec<u64> {
+        self.axes.iter().map(|(_, extent)| *extent).collect()
+    }
+}
+
+/// What a data set holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Schema {
+    /// Its quantities, in the order in which their columns are delivered.
+    pub fields: Vec<Field>,
+    /// What a draw is called: `draw`, or `scene` where it is one.
+    #[serde(default = "draw")]
+    pub row: String,
+    /// Arrays that all draws share.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub constants: Vec<Constant>,
+    /// How many draws there are.
+    pub count: u64,
+    /// The wavelengths that the axis `wavelength` stands for, nm.
+    pub wavelengths: Vec<f64>,
+    /// What the draws were made from, for files that can say so.
+    pub attributes: Map<String, Value>,
+}
+
+fn draw() -> String {
+    "draw".to_owned()
+}
+
+impl Schema {
+    /// The bytes of one draw as written.
+    pub fn row_bytes(&self) -> u64 {
+        self.fields.iter().map(|field| field.stored_bytes() as u64).sum()
+    }
+
+    /// How many draws a window of columns holds. They must agree.
+    pub(super) fn rows(&self, columns: &[&[u8]]) -> usize {
+        assert_eq!(columns.len(), self.fields.len(), "a column for each field");
+        let mut rows = self.fields.iter().zip(columns).map(|(field, column)| {
+            assert_eq!(column.len() % field.delivered_bytes(), 0, "{} has whole rows", field.name);
+            column.len() / field.delivered_bytes()
+        });
+        let first = rows.next().unwrap_or(0);
+        assert!(rows.all(|rows| rows == first), "the columns are equally long");
+        first
+    }
+
+    /// The only field, of a format that holds one.
+    pub(super) fn only_field(&self) -> &Field {
+        let [field] = self.fields.as_slice() else { panic!("the format holds one field: see Format::check") };
+        field
+    }
+
+    /// The attributes as JSON text.
+    pub(super) fn attributes_text(&self) -> String {
+        serde_json::to_string(&self.attributes).expect("maps of JSON are JSON")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_written_as_asked() {
+        let field = Field::vector("x", "wavelength", 2, Element::F32);
+        let values = [0.1f32, 1.0, 65504.0, 1e-7];
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert!(matches!(field.store(&bytes), Cow::Borrowed(_)));
+        let double = field.clone().stored_as(Element::F64);
+        let expected: Vec<u8> = values.iter().flat_map(|&v| f64::from(v).to_le_bytes()).collect();
+        assert_eq!(*double.store(&bytes), expected);
+        let half = field.stored_as(Element::F16);
+        let expected: Vec<u8> = values.iter().flat_map(|&v| f16::from_f32(v).to_le_bytes()).collect();
+        assert_eq!(*half.store(&bytes), expected);
+        assert_eq!(half.shape(5), [5, 2]);
+        let attempts = Field::scalar("attempts", Element::U32).stored_as(Element::F16);
+        assert_eq!((attempts.stored, attempts.shape(5)), (Element::U32, vec![5]));
+    }
+}

@@ -1,0 +1,55 @@
+//! Whether a set is still what was written.
+
+use std::path::{Path, PathBuf};
+
+use super::super::OutputError;
+use super::manifest::{Manifest, Plan, Sum};
+
+/// A set that is being checked, complete or not.
+pub struct Audit {
+    root: PathBuf,
+    manifest: Manifest,
+}
+
+impl Audit {
+    /// Reads the manifest of the set in a folder.
+    pub fn open(path: &Path) -> Result<Audit, OutputError> {
+        let found = if path.is_dir() { Manifest::joined(path)? } else { None };
+        let manifest = found.ok_or_else(|| OutputError::NotASet { path: path.to_owned() })?;
+        Ok(Audit { root: path.to_owned(), manifest })
+    }
+
+    /// What the set is.
+    pub fn plan(&self) -> &Plan {
+        &self.manifest.plan
+    }
+
+    /// What drew it.
+    pub fn engines(&self) -> impl Iterator<Item = &str> {
+        self.manifest.engines.iter().map(String::as_str)
+    }
+
+    /// The chunks that are done.
+    pub fn chunks(&self) -> Vec<u64> {
+        self.manifest.chunks.keys().copied().collect()
+    }
+
+    /// How the files of a chunk differ from what was written, if they do.
+    pub fn fault(&self, chunk: u64) -> Option<String> {
+        self.manifest.chunks[&chunk].iter().find_map(|sum| sum.fault(&self.root))
+    }
+
+    /// How a chunk that was drawn again differs from what was written, if it does. `columns` are its draws.
+    pub fn difference(&self, chunk: u64, columns: &[Vec<u8>]) -> Result<Option<String>, OutputError> {
+        let plan = &self.manifest.plan;
+        let failed = |source| OutputError::Write { path: self.root.clone(), source };
+        let parts = plan.layout.encode(plan, chunk, columns).map_err(failed)?;
+        let sums: Vec<Sum> = parts.iter().map(Sum::of).collect();
+        let written = &self.manifest.chunks[&chunk];
+        Ok(written
+            .iter()
+            .zip(&sums)
+            .find(|(a, b)| a != b)
+            .map(|(sum, _)| format!("{} is not what is drawn now", sum.name)))
+    }
+}

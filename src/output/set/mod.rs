@@ -1,0 +1,344 @@
+//! Data sets of many files: chunks of draws, each written once and whole, and a manifest of their sums.
+//!
+//! A set is written in a folder beside its name, `NAME.partial`, and renamed when every chunk is there. A run that is
+//! killed leaves the chunks that it finished, and the next goes on from them. Processes that share a set divide its
+//! chunks; whichever finds all of them done seals it. Since a chunk depends on the plan alone, nothing of this shows
+//! in the bytes.
+
+mod audit;
+mod manifest;
+mod pool;
+mod seal;
+
+use std::borrow::Cow;
+use std::fs;
+use std::io;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::pending::{existing_folder, place};
+use super::{OutputError, parts, zarr};
+pub use audit::Audit;
+pub use manifest::Plan;
+use manifest::{Manifest, part_name};
+use pool::{Chunk, Pool};
+pub use seal::{Outcome, merge};
+
+/// About how many bytes a chunk has unless asked otherwise: large enough for a disk, small enough to hold several.
+const CHUNK_BYTES: u64 = 16 << 20;
+
+/// How often the manifest is brought up to date, at most: what a killed run does again. Never so often that it takes
+/// more than a twentieth of the time.
+const CHECKPOINT: Duration = Duration::from_millis(100);
+
+/// How chunks are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Layout {
+    /// A Zarr store, version 3, packed by Zstandard at a level if that is given.
+    Zarr {
+        /// The level of Zstandard.
+        zstd: Option<i32>,
+    },
+    /// A folder of `.npy` files.
+    Npy,
+    /// A folder of `.parquet` files.
+    Parquet,
+}
+
+/// A file of a set.
+pub(super) struct Part<'a> {
+    /// Its path in the set's folder.
+    pub(super) name: String,
+    pub(super) bytes: Cow<'a, [u8]>,
+}
+
+impl Layout {
+    /// How many draws a chunk of such rows has, unless asked otherwise: a power of two.
+    pub fn default_chunk(row_bytes: u64) -> u64 {
+        1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2()
+    }
+
+    /// The files of a chunk.
+    fn encode<'a>(self, plan: &Plan, index: u64, columns: &'a [Vec<u8>]) -> io::Result<Vec<Part<'a>>> {
+        match self {
+            Layout::Zarr { zstd } => zarr::chunk(&plan.schema, zstd, plan.chunk, index, columns),
+            Layout::Npy => parts::npy(&plan.schema, index, columns),
+            Layout::Parquet => parts::parquet(&plan.schema, index, columns),
+        }
+    }
+
+    /// The files that tell what the chunks are.
+    fn metadata(self, plan: &Plan) -> io::Result<Vec<Part<'static>>> {
+        match self {
+            Layout::Zarr { zstd } => Ok(zarr::metadata(&plan.schema, zstd, plan.chunk)),
+            Layout::Npy => parts::npy_metadata(&plan.schema),
+            Layout::Parquet => Ok(Vec::new()),
+        }
+    }
+
+    /// The files of what all draws share.
+    fn constants(self, plan: &Plan) -> io::Result<Vec<Part<'_>>> {
+        match self {
+            Layout::Zarr { .. } => Ok(zarr::constants(&plan.schema)),
+            Layout::Npy => parts::npy_constants(&plan.schema),
+            Layout::Parquet => Ok(Vec::new()), // see Layout::check
+        }
+    }
+
+    /// The folders in a set.
+    fn folders(self, plan: &Plan) -> Vec<String> {
+        match self {
+            Layout::Zarr { .. } => {
+                let names = plan.schema.fields.iter().map(|field| field.name.clone());
+                let constants = plan.schema.constants.iter().map(|constant| constant.name.clone());
+                names.chain(constants).chain(["wavelength".to_owned()]).collect()
+            }
+            Layout::Npy | Layout::Parquet => Vec::new(),
+        }
+    }
+}
+
+/// Which part of the chunks one of several processes makes: the `index`-th of `count`, from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Which, from 1.
+    pub index: u64,
+    /// Of how many.
+    pub count: u64,
+}
+
+impl Shard {
+    /// All of them.
+    pub const WHOLE: Shard = Shard { index: 1, count: 1 };
+
+    /// Its chunks: shards differ by one chunk at most.
+    pub fn of(self, chunks: u64) -> Range<u64> {
+        let bound = |i: u64| (u128::from(i) * u128::from(chunks) / u128::from(self.count)) as u64;
+        bound(self.index - 1)..bound(self.index)
+    }
+}
+
+/// What to do with what is there already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Refuse to touch it.
+    New,
+    /// Begin again, and replace it once the new set is complete.
+    Again,
+    /// Check it, and do what is missing.
+    Resume,
+}
+
+/// A set that is being written.
+pub struct SetWriter {
+    path: PathBuf,
+    /// Where its chunks are until it is sealed.
+    root: PathBuf,
+    plan: Arc<Plan>,
+    shard: Shard,
+    start: Start,
+    /// What this process has done or found done.
+    manifest: Manifest,
+    /// The chunks to be drawn, in order.
+    missing: std::collections::VecDeque<u64>,
+    /// The columns of the first of them, as far as they came.
+    filling: Vec<Vec<u8>>,
+    pool: Pool,
+    spare: Vec<Vec<Vec<u8>>>,
+    /// When the manifest may be brought up to date again.
+    checkpoint: Instant,
+    /// Chunks that it does not have.
+    unsaved: usize,
+}
+
+impl SetWriter {
+    /// Opens a set that will appear as `path`. `companions` are small files that lie beside the chunks, by name;
+    /// `engine` is what will draw.
+    pub fn open(
+        path: &Path,
+        plan: Plan,
+        companions: &[(&str, &str)],
+        (shard, start): (Shard, Start),
+        engine: &str,
+    ) -> Result<SetWriter, OutputError> {
+        let path = PathBuf::from_iter(path.components()); // without a slash at its end
+        existing_folder(&path)?;
+        let root = seal::occupy(&path, &plan, shard, start)?;
+        let failed = |source| OutputError::Write { path: path.clone(), source };
+        let mut manifest = Manifest::new(plan.clone());
+        if let Some(found) = Manifest::joined(&root)? {
+            found.check(&plan, &root)?;
+            manifest.engines = found.engines;
+            let own = shard.of(plan.chunks());
+            let found: Vec<_> = found.chunks.into_iter().filter(|(index, _)| own.contains(index)).collect();
+            let sound =
+                |(_, sums): &(u64, Vec<manifest::Sum>)| sums.iter().all(|sum| sum.fault(&root).is_none());
+            manifest.chunks = found.into_par_iter().filter(sound).collect();
+        }
+        let missing = shard.of(plan.chunks()).filter(|index| !manifest.chunks.contains_key(index)).collect();
+        let plan = Arc::new(plan);
+        let mut writer = SetWriter {
+            filling: vec![Vec::new(); plan.schema.fields.len()],
+            pool: Pool::new(&plan, &root),
+            plan,
+            shard,
+            start,
+            manifest,
+            missing,
+            spare: Vec::new(),
+            checkpoint: Instant::now(),
+            unsaved: 0,
+            root,
+            path: path.clone(),
+        };
+        if !writer.missing.is_empty() {
+            writer.manifest.engines.insert(engine.to_owned());
+        }
+        if writer.root != writer.path {
+            for folder in writer.plan.layout.folders(&writer.plan) {
+                fs::create_dir_all(writer.root.join(folder)).map_err(failed)?;
+            }
+            let constants = writer.plan.layout.constants(&writer.plan).map_err(failed)?;
+            for part in constants {
+                place(&writer.root.join(part.name), &part.bytes).map_err(failed)?;
+            }
+            for (name, text) in companions {
+                place(&writer.root.join(name), text.as_bytes()).map_err(failed)?;
+            }
+            writer.save()?;
+        }
+        Ok(writer)
+    }
+
+    /// The draws that are to be written, in order, counted from the set's first.
+    pub fn missing(&self) -> Vec<Range<u64>> {
+        let mut ranges: Vec<Range<u64>> = Vec::new();
+        for draws in self.missing.iter().map(|&chunk| self.plan.draws(chunk)) {
+            match ranges.last_mut() {
+                Some(last) if last.end == draws.start => last.end = draws.end,
+                _ => ranges.push(draws),
+            }
+        }
+        ranges
+    }
+
+    /// How many chunks this process's part has, and how many of them are done.
+    pub fn progress(&self) -> (u64, u64) {
+        let own = self.shard.of(self.plan.chunks());
+        (own.end - own.start, self.manifest.chunks.len() as u64)
+    }
+
+    /// Where the chunks are until the set is complete.
+    pub fn folder(&self) -> &Path {
+        &self.root
+    }
+
+    /// Takes the next draws of [`SetWriter::missing`], a column for each field.
+    pub fn write(&mut self, columns: &[&[u8]]) -> Result<(), OutputError> {
+        let rows = self.plan.schema.rows(columns) as u64;
+        let mut done = 0;
+        while done < rows {
+            let index = *self.missing.front().expect("no more is written than is missing");
+            let draws = self.plan.draws(index);
+            let first = &self.plan.schema.fields[0];
+            let filled = (self.filling[0].len() / first.delivered_bytes()) as u64;
+            let part = (rows - done).min(draws.end - draws.start - filled);
+            for ((field, column), filling) in
+                self.plan.schema.fields.iter().zip(columns).zip(&mut self.filling)
+            {
+                let size = field.delivered_bytes();
+                filling.extend_from_slice(&column[done as usize * size..(done + part) as usize * size]);
+            }
+            done += part;
+            if filled + part == draws.end - draws.start {
+                self.missing.pop_front();
+                let mut columns = self.spare.pop().unwrap_or_else(|| vec![Vec::new(); self.filling.len()]);
+                std::mem::swap(&mut columns, &mut self.filling);
+                self.pool.submit(Chunk { index, columns });
+                self.collect()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes the chunks that were written meanwhile.
+    fn collect(&mut self) -> Result<(), OutputError> {
+        while let Ok(mut done) = self.pool.done.try_recv() {
+            let sums = done.written.map_err(|source| self.failed(source))?;
+            self.manifest.chunks.insert(done.chunk.index, sums);
+            self.unsaved += 1;
+            done.chunk.columns.iter_mut().for_each(Vec::clear);
+            self.spare.push(done.chunk.columns);
+        }
+        if self.unsaved > 0 && Instant::now() > self.checkpoint { self.save() } else { Ok(()) }
+    }
+
+    /// Brings this process's manifest up to date.
+    fn save(&mut self) -> Result<(), OutputError> {
+        let name = part_name(self.shard.index, self.shard.count);
+        let start = Instant::now();
+        place(&self.root.join(name), self.manifest.text().as_bytes())
+            .map_err(|source| self.failed(source))?;
+        self.checkpoint = Instant::now() + CHECKPOINT.max(20 * start.elapsed());
+        self.unsaved = 0;
+        Ok(())
+    }
+
+    /// Waits for the last chunks, and seals the set where all of it is there.
+    pub fn finish(mut self) -> Result<Outcome, OutputError> {
+        assert!(self.missing.is_empty(), "all that was missing was written");
+        if self.root == self.path {
+            return Ok(Outcome::Sealed); // it was before
+        }
+        self.pool.close();
+        self.collect()?;
+        self.save()?;
+        seal::seal(&self.path, self.start == Start::Again)
+    }
+
+    /// Keeps what is finished, and leaves the rest to another run. Says how many chunks of how many that is.
+    pub fn stop(mut self) -> Result<(u64, u64), OutputError> {
+        self.pool.stop();
+        let _ = self.collect(); // its error is the reason to stop, if there is one
+        if self.root != self.path {
+            self.save()?;
+        }
+        let (all, done) = self.progress();
+        Ok((done, all))
+    }
+
+    fn failed(&self, source: io::Error) -> OutputError {
+        OutputError::Write { path: self.path.clone(), source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_divide_the_chunks() {
+        for (chunks, count) in [(0, 3), (1, 3), (10, 3), (7, 7), (1000, 64), (u64::MAX, 5)] {
+            let shards = (1..=count).map(|index| Shard { index, count }.of(chunks));
+            let mut end = 0;
+            for shard in shards {
+                assert_eq!(shard.start, end);
+                assert!(shard.end - shard.start <= chunks.div_ceil(count));
+                end = shard.end;
+            }
+            assert_eq!(end, chunks);
+        }
+    }
+
+    #[test]
+    fn a_chunk_is_a_power_of_two_of_draws() {
+        assert_eq!(Layout::default_chunk(124), 1 << 17);
+        assert_eq!(Layout::default_chunk(1 << 40), 1);
+    }
+}

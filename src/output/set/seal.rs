@@ -1,0 +1,136 @@
+//! The folder of a set: how it begins, and how it comes to its name.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::super::OutputError;
+use super::super::pending::{PREFIX, folder, place_by, sweep, sync_folder};
+use super::manifest::{Manifest, SEALED, manifests, part_name, remove_parts};
+use super::{Plan, Shard, Start};
+
+/// What a run left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The set is complete, under its name.
+    Sealed,
+    /// Other processes have chunks to finish.
+    Waiting {
+        /// How many chunks are done.
+        done: u64,
+        /// Of how many.
+        chunks: u64,
+    },
+}
+
+/// Where the chunks of `path` are until it is complete.
+fn partial(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    PathBuf::from(name)
+}
+
+/// Sees to it that the set's folder is there, and that it may be written to. Returns where its chunks are: in `path`
+/// itself where a complete set is resumed.
+pub(super) fn occupy(path: &Path, plan: &Plan, shard: Shard, start: Start) -> Result<PathBuf, OutputError> {
+    let failed = |source| OutputError::Write { path: path.to_owned(), source };
+    if path.symlink_metadata().is_ok() {
+        if !path.is_dir() {
+            return Err(OutputError::NotAFolder { path: path.to_owned() });
+        }
+        match start {
+            Start::New => return Err(OutputError::Exists { path: path.to_owned() }),
+            Start::Again => drop(Manifest::sealed(path)?), // nothing but a set is replaced
+            Start::Resume => {
+                let sealed = Manifest::sealed(path)?;
+                sealed.check(plan, path)?;
+                let fault = sealed.chunks.values().flatten().find_map(|sum| sum.fault(path));
+                return match fault {
+                    Some(fault) => Err(OutputError::Damaged { path: path.to_owned(), fault }),
+                    None => Ok(path.to_owned()),
+                };
+            }
+        }
+    }
+    let root = partial(path);
+    match fs::create_dir(&root) {
+        Ok(()) => return Ok(root),
+        Err(e) if e.kind() == io::ErrorKind::AlreadyExists && root.is_dir() => {}
+        Err(e) => return Err(failed(e)),
+    }
+    let is_set = !manifests(&root).map_err(failed)?.is_empty();
+    match start {
+        Start::Again if is_set => {
+            fs::remove_dir_all(&root).and_then(|()| fs::create_dir(&root)).map_err(failed)?;
+        }
+        // Another process may have made the folder this very moment.
+        Start::New if shard.count > 1 && !root.join(part_name(shard.index, shard.count)).exists() => {}
+        Start::New if is_set => return Err(OutputError::Unfinished { path: path.to_owned(), root }),
+        Start::New | Start::Again | Start::Resume => {}
+    }
+    Ok(root)
+}
+
+/// Seals a set of which other processes have made the chunks.
+pub fn merge(path: &Path) -> Result<(), OutputError> {
+    let path = PathBuf::from_iter(path.components());
+    let path = match path.to_string_lossy().strip_suffix(".partial") {
+        Some(name) => PathBuf::from(name),
+        None => path,
+    };
+    match seal(&path, false)? {
+        Outcome::Sealed => Ok(()),
+        Outcome::Waiting { done, chunks } => Err(OutputError::Incomplete { path, done, chunks }),
+    }
+}
+
+/// Joins the manifests of a set's processes and gives the set its name, if all of it is there. Several processes may
+/// do this at once: each step is the same whoever takes it, and can be taken twice.
+pub(super) fn seal(path: &Path, replace: bool) -> Result<Outcome, OutputError> {
+    let root = partial(path);
+    match try_seal(path, &root, replace) {
+        // Another process was faster: what was to be renamed has its name.
+        Err(_) if !root.exists() && Manifest::sealed(path).is_ok() => Ok(Outcome::Sealed),
+        result => result,
+    }
+}
+
+fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<Outcome, OutputError> {
+    let failed = |source| OutputError::Write { path: path.to_owned(), source };
+    let Some(manifest) = Manifest::joined(root)? else {
+        return Err(OutputError::NotASet { path: root.to_owned() });
+    };
+    if !manifest.is_complete() {
+        let (done, chunks) = (manifest.chunks.len() as u64, manifest.plan.chunks());
+        return Ok(Outcome::Waiting { done, chunks });
+    }
+    // Temporary files are made outside: one that is inside while another process renames would stay there. Theirs is a
+    // name that tells them from those of other files in that folder.
+    let by = folder(path);
+    let prefix = format!("{PREFIX}{}.seal-", path.file_name().unwrap_or_default().to_string_lossy());
+    let place = |name: &str, bytes: &[u8]| place_by(by, &prefix, &root.join(name), bytes).map_err(failed);
+    let layout = manifest.plan.layout;
+    for part in layout.metadata(&manifest.plan).map_err(failed)? {
+        place(&part.name, &part.bytes)?;
+    }
+    place(SEALED, manifest.text().as_bytes())?;
+    remove_parts(root).map_err(failed)?;
+    for folder in layout.folders(&manifest.plan) {
+        sweep(&root.join(&folder), PREFIX).map_err(failed)?;
+        sync_folder(&root.join(&folder));
+    }
+    sweep(root, PREFIX).map_err(failed)?;
+    sync_folder(root);
+    match replace && path.exists() {
+        true => {
+            let old = partial(&root.with_extension("replaced"));
+            fs::rename(path, &old).map_err(failed)?;
+            fs::rename(root, path).map_err(failed)?;
+            fs::remove_dir_all(old).map_err(failed)?;
+        }
+        false => fs::rename(root, path).map_err(failed)?,
+    }
+    sweep(by, &prefix).map_err(failed)?;
+    sync_folder(by);
+    Ok(Outcome::Sealed)
+}

@@ -1,0 +1,325 @@
+//! A chart: series on two axes, linear or logarithmic, with a key above them.
+
+use std::sync::Arc;
+
+use kuva::prelude::{BandPlot, Layout, LinePlot, Plot, ScatterPlot, SvgBackend, Theme, TickFormat};
+use kuva::render::figure::Figure;
+use kuva::render::render::{Primitive, TextAnchor};
+
+/// The size of a chart, and what it leaves for text on its left, right and bottom.
+const SIZE: (f64, f64) = (640.0, 430.0);
+const MARGINS: [f64; 3] = [64.0, 18.0, 48.0];
+
+/// What is left above the axes for the title and the name of the vertical axis, and for each row of the key.
+const HEADING: f64 = 58.0;
+const KEY_ROW: f64 = 18.0;
+
+const TITLE_SIZE: u32 = 15;
+const LABEL_SIZE: u32 = 12;
+
+/// About the width of a character of the key.
+const CHARACTER: f64 = 6.2;
+
+const INK: &str = "#2b2f36";
+const LABEL_INK: &str = "#5b626c";
+
+/// Quiet, for what only guides the eye.
+pub(super) const GUIDE: &str = "#8a9099";
+
+/// Colours of Okabe and Ito, told apart by the colour-blind too.
+pub(super) const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#6b4c9a"];
+
+/// An axis.
+pub(super) struct Axis {
+    pub(super) label: String,
+    pub(super) limits: (f64, f64),
+    pub(super) logarithmic: bool,
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Style {
+    /// Points joined by a line.
+    Line,
+    /// A line without points.
+    Plain,
+    /// A broken one.
+    Dashed,
+    /// One of dots.
+    Dotted,
+    /// Points alone.
+    Points,
+    /// Columns of a histogram, given by their lower edges and one end.
+    Steps,
+}
+
+/// Points, and where given how far down and up each may be.
+pub(super) struct Series {
+    pub(super) name: String,
+    pub(super) colour: &'static str,
+    pub(super) style: Style,
+    pub(super) points: Vec<(f64, f64)>,
+    pub(super) band: Option<Vec<(f64, f64)>>,
+}
+
+/// A chart.
+pub(super) struct Chart {
+    pub(super) title: String,
+    pub(super) x: Axis,
+    pub(super) y: Axis,
+    pub(super) series: Vec<Series>,
+}
+
+impl Axis {
+    pub(super) fn linear(label: &str, limits: (f64, f64)) -> Axis {
+        Axis { label: label.to_owned(), limits, logarithmic: false }
+    }
+
+    /// A logarithmic axis that holds all positive values, from a 1, 2 or 5 to another.
+    pub(super) fn decades(label: &str, values: impl IntoIterator<Item = f64>) -> Axis {
+        let values = values.into_iter().filter(|&v| v > 0.0 && v.is_finite());
+        let (low, high) = values.fold((f64::INFINITY, 0f64), |(a, b), v| (a.min(v), b.max(v)));
+        let (low, high) = if low < high { (low, high) } else { (0.1, 1.0) };
+        let limits = (round_down(low / 1.1), 1.0 / round_down(1.0 / (1.1 * high)));
+        Axis { label: label.to_owned(), limits, logarithmic: true }
+    }
+}
+
+/// The largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, 10, ... that is at most `value`.
+fn round_down(value: f64) -> f64 {
+    let decade = 10f64.powf(value.log10().floor());
+    [5.0, 2.0, 1.0].map(|m| m * decade).into_iter().find(|&v| v <= value).unwrap_or(decade)
+}
+
+impl Series {
+    pub(super) fn new(name: &str, colour: &'static str, style: Style, points: Vec<(f64, f64)>) -> Series {
+        Series { name: name.to_owned(), colour, style, points, band: None }
+    }
+
+    pub(super) fn with_band(self, band: Vec<(f64, f64)>) -> Series {
+        Series { band: Some(band), ..self }
+    }
+
+    fn plots(&self) -> Vec<Plot> {
+        let mut plots = Vec::new();
+        if let Some(band) = &self.band {
+            let x = self.points.iter().map(|p| p.0);
+            let (low, high) = (band.iter().map(|b| b.0), band.iter().map(|b| b.1));
+            plots.push(BandPlot::new(x, low, high).with_color(self.colour).with_opacity(0.2).into());
+        }
+        let line = || LinePlot::new().with_data(self.points.clone()).with_color(self.colour);
+        match self.style {
+            Style::Line => plots.push(line().with_stroke_width(1.8).into()),
+            Style::Dashed => plots.push(line().with_stroke_width(1.3).with_dashed().into()),
+            Style::Dotted => plots.push(line().with_stroke_width(1.6).with_dotted().into()),
+            Style::Plain => plots.push(line().with_stroke_width(1.8).into()),
+            Style::Steps => {
+                let corners = self.points.windows(2).flat_map(|w| [w[0], (w[1].0, w[0].1)]);
+                let steps = LinePlot::new().with_data(corners.collect::<Vec<_>>()).with_color(self.colour);
+                plots.push(steps.with_stroke_width(1.8).into());
+            }
+            Style::Points => {}
+        }
+        if matches!(self.style, Style::Line | Style::Points) {
+            let points =
+                ScatterPlot::new().with_data(self.points.clone()).with_color(self.colour).with_size(3.6);
+            plots.push(points.into());
+        }
+        plots
+    }
+}
+
+impl Chart {
+    /// The chart as SVG.
+    pub(super) fn svg(&self) -> String {
+        let keys = self.keys();
+        let rows = keys.iter().map(|key| key.row + 1).max().unwrap_or(0);
+        let top = HEADING + KEY_ROW * rows as f64;
+        let plots: Vec<Plot> = self.series.iter().flat_map(Series::plots).collect();
+        let mut scene = Figure::new(1, 1)
+            .with_plots(vec![plots])
+            .with_layouts(vec![self.layout(top)])
+            .with_cell_size(SIZE.0, SIZE.1)
+            .with_spacing(0.0)
+            .with_padding(0.0)
+            .render();
+        scene.elements.iter_mut().for_each(set_heading);
+        for key in keys {
+            scene.elements.extend(key.draw(HEADING));
+        }
+        SvgBackend::new().render_scene(&scene)
+    }
+
+    fn layout(&self, top: f64) -> Layout {
+        let theme = Theme {
+            axis_color: INK.into(),
+            tick_color: INK.into(),
+            text_color: INK.into(),
+            grid_color: "#e6e8eb".into(),
+            legend_border: "none".into(),
+            ..Theme::light()
+        };
+        let ((x_low, x_high), (y_low, y_high)) = (self.x.limits, self.y.limits);
+        let [left, right, bottom] = MARGINS;
+        let mut layout = Layout::new(self.x.limits, self.y.limits)
+            .with_x_axis_min(x_low)
+            .with_x_axis_max(x_high)
+            .with_y_axis_min(y_low)
+            .with_y_axis_max(y_high)
+            .with_theme(theme)
+            .with_force_margins(left, right)
+            .with_force_margins_y(top, bottom)
+            .with_title(self.title.clone())
+            .with_x_label(self.x.label.clone())
+            .with_y_label(self.y.label.clone())
+            .with_title_size(TITLE_SIZE)
+            .with_label_size(LABEL_SIZE)
+            .with_tick_size(LABEL_SIZE - 1);
+        if self.x.logarithmic {
+            layout = layout.with_log_x().with_x_tick_format(powers(self.x.limits));
+        }
+        if self.y.logarithmic {
+            layout = layout.with_log_y().with_y_tick_format(powers(self.y.limits));
+        }
+        layout
+    }
+
+    /// The key: a mark and a name for each named series, in rows.
+    fn keys(&self) -> Vec<Key<'_>> {
+        let (mut x, mut row) = (MARGINS[0], 0);
+        let named = self.series.iter().filter(|s| !s.name.is_empty());
+        named
+            .map(|series| {
+                let width = 44.0 + CHARACTER * series.name.chars().count() as f64;
+                if x > MARGINS[0] && x + width > SIZE.0 - MARGINS[1] {
+                    (x, row) = (MARGINS[0], row + 1);
+                }
+                let key = Key { series, x, row };
+                x += width;
+                key
+            })
+            .collect()
+    }
+}
+
+/// An entry of the key.
+struct Key<'a> {
+    series: &'a Series,
+    x: f64,
+    row: usize,
+}
+
+impl Key<'_> {
+    fn draw(&self, top: f64) -> Vec<Primitive> {
+        let y = top + KEY_ROW * self.row as f64;
+        let mark = match self.series.style {
+            Style::Points => Primitive::Circle {
+                cx: self.x + 11.0,
+                cy: y,
+                r: 3.6,
+                fill: self.series.colour.into(),
+                fill_opacity: None,
+                stroke: None,
+                stroke_width: None,
+            },
+            style => Primitive::Line {
+                x1: self.x,
+                y1: y,
+                x2: self.x + 22.0,
+                y2: y,
+                stroke: self.series.colour.into(),
+                stroke_width: 2.4,
+                stroke_dasharray: match style {
+                    Style::Dashed => Some("6 3".into()),
+                    Style::Dotted => Some("2 3".into()),
+                    _ => None,
+                },
+            },
+        };
+        let text = Primitive::Text {
+            x: self.x + 28.0,
+            y: y + 4.0,
+            content: self.series.name.clone(),
+            size: LABEL_SIZE - 1,
+            anchor: TextAnchor::Start,
+            rotate: None,
+            bold: false,
+            color: None,
+        };
+        vec![mark, text]
+    }
+}
+
+/// Moves the title, and the name of the vertical axis, to the upper left corner, level: turned text reads badly.
+fn set_heading(element: &mut Primitive) {
+    if let Primitive::Text { x, y, size, anchor, rotate, color, .. } = element {
+        let is_title = *size == TITLE_SIZE;
+        if is_title || rotate.is_some() {
+            (*x, *y) = (12.0, if is_title { 21.0 } else { 40.0 });
+            (*anchor, *rotate) = (TextAnchor::Start, None);
+            *color = (!is_title).then(|| LABEL_INK.into());
+        }
+    }
+}
+
+/// Powers of ten as such, unless all are short. What lies between them is named where there is room, on axes of two
+/// decades or less.
+fn powers((low, high): (f64, f64)) -> TickFormat {
+    let (few, short) = (high / low < 101.0, low > 0.9e-3 && high < 1.1e4);
+    TickFormat::Custom(Arc::new(move |value| {
+        let exponent = value.log10().floor() as i32;
+        let digit = (value / 10f64.powi(exponent)).round();
+        let (digit, exponent) = if digit == 10.0 { (1.0, exponent + 1) } else { (digit, exponent) };
+        match (digit == 1.0, exponent) {
+            (false, _) if !few => String::new(),
+            _ if short => format!("{}", (value * 1e6).round() / 1e6),
+            (true, 0) => "1".to_owned(),
+            (true, 1) => "10".to_owned(),
+            (true, n) => format!("10{}", superscript(n)),
+            (false, n) => format!("{digit}·10{}", superscript(n)),
+        }
+    }))
+}
+
+/// A number in superscript.
+pub(super) fn superscript(n: i32) -> String {
+    let digit = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        c => char::from_u32(0x2070 + u32::from(c) - u32::from('0')).unwrap_or(c),
+    };
+    n.to_string().chars().map(digit).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponents_are_raised() {
+        assert_eq!([-12, 3, 40].map(superscript), ["⁻¹²", "³", "⁴⁰"]);
+    }
+
+    #[test]
+    fn axes_end_on_round_numbers() {
+        assert_eq!([0.99, 1.0, 3.4, 7e-5].map(round_down), [0.5, 1.0, 2.0, 5e-5]);
+        assert_eq!(Axis::decades("", [0.0017, 1.0]).limits, (1e-3, 2.0));
+    }
+
+    #[test]
+    fn a_chart_names_its_axes_and_series() {
+        let series = Series::new("draws", COLOURS[0], Style::Line, vec![(1e-3, 0.5), (1.0, 0.25)]);
+        let chart = Chart {
+            title: "Errors fall".to_owned(),
+            x: Axis::decades("run time (s)", [1e-3, 1.0]),
+            y: Axis::linear("share", (0.0, 1.0)),
+            series: vec![series.with_band(vec![(0.4, 0.6), (0.2, 0.3)])],
+        };
+        let svg = chart.svg();
+        for text in ["Errors fall", "run time (s)", "share", "draws", "10⁻³"] {
+            assert!(svg.contains(text), "no {text:?}");
+        }
+    }
+}

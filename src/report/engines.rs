@@ -1,0 +1,147 @@
+//! What draws, in one form: engines in f32, and the CPU in f64.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Bench, ReportError};
+use crate::cpu::Kernel;
+use crate::engine::{Adapter, Batch, Drawer, Engine, EngineError};
+use crate::program::Tally;
+use crate::recipe::Recipe;
+use crate::statistics::rows;
+use crate::stream::Draws;
+
+/// Draws of a window in f64.
+const WINDOW: u64 = 1 << 15;
+
+/// What drew.
+#[derive(Clone, Debug, Serialize)]
+pub struct EngineFacts {
+    /// What it is called, briefly.
+    pub name: String,
+    /// The floating-point type of its draws.
+    pub precision: &'static str,
+    /// What it is called in full, with the driver.
+    pub description: String,
+    /// The adapter; nothing on the CPU.
+    pub adapter: Option<Adapter>,
+}
+
+/// What draws.
+pub(super) struct Target {
+    pub(super) facts: EngineFacts,
+    /// Nothing for f64.
+    engine: Option<Engine>,
+}
+
+/// Spectra one after another.
+pub(super) enum Values<'a> {
+    Single(&'a [f32]),
+    Double(&'a [f64]),
+}
+
+impl Target {
+    pub(super) fn single(engine: Engine) -> Target {
+        let name = match engine.adapter() {
+            // Drivers say much in brackets.
+            Some(adapter) => adapter.name.split('(').next().unwrap_or_default().trim().to_owned(),
+            None => "CPU".to_owned(),
+        };
+        let facts = EngineFacts {
+            name: format!("{name}, f32"),
+            precision: "f32",
+            description: engine.to_string(),
+            adapter: engine.adapter().cloned(),
+        };
+        Target { facts, engine: Some(engine) }
+    }
+
+    pub(super) fn double() -> Target {
+        let facts = EngineFacts {
+            name: "CPU, f64".to_owned(),
+            precision: "f64",
+            description: format!("CPU ({} threads), draw by draw", rayon::current_num_threads()),
+            adapter: None,
+        };
+        Target { facts, engine: None }
+    }
+
+    /// The engine, where draws are in f32.
+    pub(super) fn engine(&self) -> Option<&Engine> {
+        self.engine.as_ref()
+    }
+
+    pub(super) fn runner<'a>(&'a self, recipe: &'a Recipe) -> Result<Runner<'a>, EngineError> {
+        match &self.engine {
+            Some(engine) => Ok(Runner::Single(engine.drawer(recipe)?)),
+            None => Ok(Runner::Double(Kernel::new(&recipe.program().spectra_alone()))),
+        }
+    }
+}
+
+/// A target with a recipe.
+pub(super) enum Runner<'a> {
+    Single(Drawer<'a>),
+    Double(Kernel<f64>),
+}
+
+impl Runner<'_> {
+    /// Makes `draws` and hands them to `sink` in order. Returns how many candidates that took.
+    pub(super) fn draw(
+        &mut self,
+        bench: &Bench,
+        draws: Draws,
+        sink: &mut dyn FnMut(Values, &[Tally]),
+    ) -> Result<u64, ReportError> {
+        match self {
+            Runner::Single(drawer) => {
+                let summary = drawer.draw(draws, |batch| {
+                    bench.say("")?;
+                    let (values, tallies) = contents(&batch);
+                    sink(Values::Single(values), tallies);
+                    Ok::<_, ReportError>(())
+                })?;
+                Ok(summary.attempts)
+            }
+            Runner::Double(kernel) => {
+                let (mut values, mut tallies, mut attempts) = (Vec::new(), Vec::new(), 0);
+                for offset in (0..draws.count).step_by(WINDOW as usize) {
+                    bench.say("")?;
+                    let part = draws.part(offset, WINDOW.min(draws.count - offset));
+                    fill(kernel, part, &mut values, &mut tallies);
+                    attempts += tallies.iter().map(|t: &Tally| u64::from(t.attempts())).sum::<u64>();
+                    sink(Values::Double(&values), &tallies);
+                }
+                Ok(attempts)
+            }
+        }
+    }
+
+    /// How long `draws` take, when nothing is done with them; and how many candidates they took.
+    pub(super) fn time(&mut self, bench: &Bench, draws: Draws) -> Result<(f64, u64), ReportError> {
+        let start = Instant::now();
+        let attempts = self.draw(bench, draws, &mut |_, _| {})?;
+        Ok((start.elapsed().as_secs_f64(), attempts))
+    }
+}
+
+/// The spectra of a batch, and what each draw took.
+fn contents<'b>(batch: &'b Batch) -> (&'b [f32], &'b [Tally]) {
+    debug_assert_eq!(rows(batch).count() as u64, batch.draws.count);
+    (batch.spectra(), batch.tallies())
+}
+
+/// Draws in f64, on all cores.
+pub(super) fn fill(kernel: &Kernel<f64>, draws: Draws, values: &mut Vec<f64>, tallies: &mut Vec<Tally>) {
+    let bands = kernel.bands();
+    values.resize(draws.count as usize * bands, 0.0);
+    tallies.resize(draws.count as usize, Tally::FAILED);
+    let rows = values.par_chunks_exact_mut(bands).zip(tallies).enumerate();
+    rows.with_min_len(256).for_each(|(i, (row, tally))| {
+        let (drawn, took) = kernel.draw(draws.stream, draws.first.wrapping_add(i as u64));
+        row.copy_from_slice(&drawn[0]);
+        *tally = took;
+    });
+}

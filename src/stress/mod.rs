@@ -1,0 +1,99 @@
+//! Stiff and extreme cases, each with a definite right answer: values within a stated bound, or an error of a stated
+//! kind. None may hang, give what is not a number, or give a spectrum that is not physical.
+//!
+//! Tests demand every answer, and the report shows them for its user's adapter. Values are judged against the draw in
+//! f64 from the same words, in parts of the largest terms that they are made of, because that is what f32 rounds.
+
+mod bounds;
+mod counters;
+mod examine;
+mod fits;
+mod models;
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::engine::Engine;
+
+/// A case, to be run on an engine.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// What is stiff or extreme.
+    pub name: &'static str,
+    /// What could break.
+    pub could_break: &'static str,
+    run: fn(&Engine) -> Answer,
+}
+
+/// What a case came to, or what is wrong with it.
+type Answer = Result<Good, String>;
+
+/// A right answer.
+#[derive(Debug, Default)]
+struct Good {
+    result: String,
+    /// The largest error found, and what it may be.
+    error: Option<(f64, f64)>,
+}
+
+/// What came of a case.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outcome {
+    /// What is stiff or extreme.
+    pub name: &'static str,
+    /// What could break.
+    pub could_break: &'static str,
+    /// Whether the answer is the right one.
+    pub passed: bool,
+    /// The answer in words.
+    pub result: String,
+    /// The largest error found, where there are values: in parts of the largest mean and deviation of a band, or of the
+    /// spectrum's peak where there is a target LRV, unless `result` says of what.
+    pub error: Option<f64>,
+    /// What the error may be.
+    pub bound: Option<f64>,
+    /// How long it took, seconds.
+    pub seconds: f64,
+}
+
+/// Every case.
+pub fn cases() -> impl Iterator<Item = &'static Case> {
+    [models::CASES, fits::CASES, bounds::CASES, counters::CASES].into_iter().flatten()
+}
+
+impl Case {
+    /// Runs the case.
+    pub fn run(&self, engine: &Engine) -> Outcome {
+        let start = Instant::now();
+        let answer = (self.run)(engine);
+        let seconds = start.elapsed().as_secs_f64();
+        let (answer, wrong) = match answer {
+            Ok(good) => (good, false),
+            Err(result) => (Good { result, error: None }, true),
+        };
+        Outcome {
+            name: self.name,
+            could_break: self.could_break,
+            passed: !wrong && answer.error.is_none_or(|(error, bound)| error <= bound),
+            result: answer.result,
+            error: answer.error.map(|(error, _)| error),
+            bound: answer.error.map(|(_, bound)| bound),
+            seconds,
+        }
+    }
+}
+
+const fn case(name: &'static str, could_break: &'static str, run: fn(&Engine) -> Answer) -> Case {
+    Case { name, could_break, run }
+}
+
+/// An answer without values.
+fn good(result: impl Into<String>) -> Answer {
+    Ok(Good { result: result.into(), error: None })
+}
+
+/// An answer with the largest error and its bound.
+fn within(result: impl Into<String>, error: f64, bound: f64) -> Answer {
+    Ok(Good { result: result.into(), error: Some((error, bound)) })
+}

@@ -1,0 +1,210 @@
+//! Each format, opened by the reader that its users use, holds what the `.npy` holds.
+
+mod program;
+
+use std::fs;
+use std::path::Path;
+
+use program::{fails, files, npy, python, succeeds};
+
+/// 1,000 reflectances in `a.npy`, and the same in a file or folder of another format.
+fn beside(folder: &Path, output: &str) {
+    succeeds(folder, "sample munsell-vrhel -n 1000 --seed 3 --engine cpu -o a.npy --force");
+    succeeds(folder, &format!("sample munsell-vrhel -n 1000 --seed 3 --engine cpu -o {output}"));
+}
+
+/// That Python finds `expression` equal to the `.npy`, in bytes and type, and the wavelengths those of the model.
+fn equals(folder: &Path, before: &str, expression: &str, wavelengths: &str) {
+    let code = format!(
+        "import numpy as np\n\
+         a = np.load('a.npy')\n\
+         {before}\n\
+         b, w = np.asarray({expression}), np.asarray({wavelengths})\n\
+         print(b.dtype, a.dtype == b.dtype, a.shape == b.shape and a.tobytes() == b.tobytes(), w.tolist() == list(range(400, 701, 10)))"
+    );
+    assert_eq!(python(folder, &code), "float32 True True True", "{before}");
+}
+
+#[test]
+fn npz() {
+    let folder = tempfile::tempdir().unwrap();
+    beside(folder.path(), "b.npz");
+    let load = "f = np.load('b.npz')\n\
+                import json, zipfile\n\
+                assert zipfile.ZipFile('b.npz').testzip() is None\n\
+                assert json.loads(str(f['attributes']))['seed'] == 3";
+    equals(folder.path(), load, "f['spectra']", "f['wavelengths']");
+}
+
+#[test]
+fn hdf5() {
+    let folder = tempfile::tempdir().unwrap();
+    beside(folder.path(), "b.h5");
+    let load = "import h5py; f = h5py.File('b.h5')\n\
+                assert f['spectra'].chunks is not None and f.attrs['model'] == 'munsell-vrhel', f.attrs['model']";
+    equals(folder.path(), load, "f['spectra']", "f['wavelength']");
+}
+
+#[test]
+fn matlab() {
+    let folder = tempfile::tempdir().unwrap();
+    beside(folder.path(), "b.mat");
+    let load = "import h5py; f = h5py.File('b.mat')\n\
+                head = open('b.mat', 'rb').read(128)\n\
+                assert head.startswith(b'MATLAB 7.3 MAT-file') and head[124:] == b'\\x00\\x02IM'\n\
+                assert f['S_X'][:].ravel().tolist() == [400, 10, 31] and f['S_X'].shape == (3, 1)\n\
+                assert f['X'].attrs['MATLAB_class'] == b'single' and f['data'] == f['X']\n\
+                assert f['comment'].attrs['MATLAB_class'] == b'char'\n\
+                assert ''.join(map(chr, f['comment'][:].ravel())).startswith('{')";
+    // HDF5's rows are MATLAB's columns.
+    equals(folder.path(), load, "f['X']", "f['wavelength'][0]");
+}
+
+#[test]
+fn parquet() {
+    let folder = tempfile::tempdir().unwrap();
+    beside(folder.path(), "b.parquet");
+    let load = "import json, pyarrow.parquet as pq; t = pq.read_table('b.parquet')\n\
+                assert str(t.schema.field('spectra').type) == 'fixed_size_list<element: float not null>[31]', t.schema\n\
+                meta = t.schema.metadata\n\
+                assert json.loads(meta[b'spectroll'])['seed'] == 3\n\
+                column = t['spectra'].combine_chunks()";
+    let flat = "column.flatten().to_numpy(zero_copy_only=False).reshape(-1, 31)";
+    equals(folder.path(), load, flat, "json.loads(meta[b'wavelengths'])");
+}
+
+#[test]
+fn zarr() {
+    let folder = tempfile::tempdir().unwrap();
+    for flags in ["", "--zstd", "--zstd 7 --chunk 300"] {
+        beside(folder.path(), &format!("b.zarr {flags}"));
+        let load = "import zarr; f = zarr.open_group('b.zarr', mode='r', use_consolidated=True)";
+        equals(folder.path(), load, "f['spectra']", "f['wavelength']");
+        let load = "import xarray; d = xarray.open_zarr('b.zarr')\n\
+                    assert d.spectra.dims == ('draw', 'wavelength') and 'wavelength' in d.coords\n\
+                    assert d.attrs['seed'] == 3 and d.wavelength.attrs['units'] == 'nm'";
+        equals(folder.path(), load, "d.spectra", "d.wavelength");
+        fs::remove_dir_all(folder.path().join("b.zarr")).unwrap();
+    }
+}
+
+#[test]
+fn folders_of_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    beside(folder.path(), "b/ --format npy --chunk 300");
+    let load = "import glob; parts = [np.load(p) for p in sorted(glob.glob('b/spectra-*.npy'))]\n\
+                assert [len(p) for p in parts] == [300, 300, 300, 100]";
+    equals(folder.path(), load, "np.concatenate(parts)", "np.load('b/wavelengths.npy')");
+    beside(folder.path(), "c/ --format parquet --chunk 300");
+    let load = "import json, glob, pyarrow.parquet as pq\n\
+                t = pq.read_table(sorted(glob.glob('c/*.parquet')))\n\
+                column = t['spectra'].combine_chunks()";
+    let flat = "column.flatten().to_numpy(zero_copy_only=False).reshape(-1, 31)";
+    equals(folder.path(), load, flat, "json.loads(t.schema.metadata[b'wavelengths'])");
+}
+
+#[test]
+fn types() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "sample granada -n 500 -o a.npy");
+    for dtype in ["f16", "f64"] {
+        for output in ["b.npy", "b.npz", "b.h5", "b.zarr", "b.csv"] {
+            succeeds(folder, &format!("sample granada -n 500 --dtype {dtype} -o {output} --force"));
+        }
+        let code = format!(
+            "import numpy as np, h5py, zarr\n\
+             a = np.load('a.npy').astype('{}')\n\
+             text = np.loadtxt('b.csv', delimiter=',', skiprows=1).astype(a.dtype)\n\
+             bs = [np.load('b.npy'), np.load('b.npz')['spectra'], h5py.File('b.h5')['spectra'][:], \
+             zarr.open('b.zarr', mode='r')['spectra'][:], text]\n\
+             print([b.dtype == a.dtype and b.tobytes() == a.tobytes() for b in bs])",
+            dtype.replace('f', "float")
+        );
+        assert_eq!(python(folder, &code), "[True, True, True, True, True]", "{dtype}");
+    }
+    for output in ["x.mat", "x.parquet"] {
+        fails(folder, &format!("sample granada -n 5 --dtype f16 -o {output}"), 1, "choose one with --dtype");
+        succeeds(folder, &format!("sample granada -n 5 --dtype f64 -o {output}"));
+    }
+}
+
+#[test]
+fn spd_folders_are_named_as_the_authors_named_theirs() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "sample munsell-vrhel -n 3 --seed 3 --engine cpu -o a.npy");
+    succeeds(folder, "sample munsell-vrhel -n 3 --seed 3 --engine cpu --format spd -o b/");
+    assert_eq!(
+        files(&folder.join("b")),
+        ["reflectance_001.spd", "reflectance_002.spd", "reflectance_003.spd"]
+    );
+    let (_, values) = npy(&folder.join("a.npy"));
+    let text = fs::read_to_string(folder.join("b/reflectance_002.spd")).unwrap();
+    assert!(text.starts_with("400 0.") && text.ends_with('\n'));
+    let parsed: Vec<f32> =
+        text.lines().map(|line| line.split_once(' ').unwrap().1.parse().unwrap()).collect();
+    assert_eq!(parsed, values[31..62]);
+    succeeds(folder, "sample granada -n 2 --start 998 --format spd -o light/");
+    assert_eq!(files(&folder.join("light")), ["illuminance_1000.spd", "illuminance_999.spd"]);
+    succeeds(folder, "sample munsell-vrhel -n 1 --lrv 0.4 --format spd -o target/");
+    assert_eq!(files(&folder.join("target")), ["luminance-0.4000-reflectance-001.spd"]);
+    fails(folder, "sample granada -n 10001 --format spd -o many/", 1, "pass --force");
+    fails(folder, "sample granada -n 1 --format spd -o light/", 1, "exists already");
+}
+
+/// Mitsuba is a large download: SPECTROLL_MITSUBA=1 asks for the test.
+#[test]
+fn spd_files_load_in_mitsuba() {
+    if std::env::var_os("SPECTROLL_MITSUBA").is_none() {
+        println!("skipped: SPECTROLL_MITSUBA is not set");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(folder.path(), "sample munsell-vrhel -n 1 --format spd -o b/");
+    let code = "import mitsuba as mi\n\
+                mi.set_variant('scalar_spectral')\n\
+                s = mi.load_dict({'type': 'spectrum', 'filename': 'b/reflectance_001.spd'})\n\
+                line = open('b/reflectance_001.spd').read().split()\n\
+                si = mi.SurfaceInteraction3f(); si.wavelengths = [400, 410, 550, 700]\n\
+                got = s.eval(si)\n\
+                values = dict(zip(map(float, line[::2]), map(float, line[1::2])))\n\
+                print(max(abs(got[i] - values[w]) for i, w in enumerate([400, 410, 550, 700])) < 1e-6)";
+    assert_eq!(python(folder.path(), code), "True");
+}
+
+#[test]
+fn fits_read_what_samples_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for output in ["a.npy", "a.h5", "a.mat", "b.npy --dtype f16", "b.h5 --dtype f64"] {
+        succeeds(folder, &format!("sample munsell-vrhel -n 500 --engine cpu -o {output}"));
+    }
+    let explains = |arguments: &str| {
+        let (_, summary) = succeeds(folder, &format!("fit {arguments} --kind reflectance -o m.json --force"));
+        summary.split_once("explain").unwrap().1.to_owned()
+    };
+    let expected = explains("a.npy --wavelengths 400:10:700");
+    assert!(expected.contains("of 500 reflectances"), "{expected}");
+    for file in ["a.h5", "a.mat", "a.mat:X", "b.npy --wavelengths 400:10:700", "b.h5"] {
+        assert_eq!(explains(file), expected, "{file}");
+    }
+    fails(folder, "fit a.npy --kind reflectance -o x.json", 4, "pass --wavelengths");
+    fails(
+        folder,
+        "fit a.npy --kind reflectance --wavelengths 400:5:700 -o x.json",
+        4,
+        "31 bands do not lie on the 61",
+    );
+    // What MATLAB itself writes is compressed, and of doubles.
+    python(
+        folder,
+        "import h5py, numpy as np\n\
+         f = h5py.File('theirs.mat', 'w', userblock_size=512, libver='earliest')\n\
+         f.create_dataset('sur_mine', data=np.load('a.npy').astype('f8'), compression='gzip', shuffle=True)\n\
+         f['S_mine'] = np.array([[400.0], [10.0], [31.0]])\n\
+         f.close()",
+    );
+    let (_, summary) = succeeds(folder, "fit theirs.mat -o theirs.json");
+    assert!(summary.contains("of 500 reflectances"), "{summary}");
+}

@@ -1,0 +1,73 @@
+//! Runs of the program, and of Python on what they leave.
+
+// Each test binary has this module, and none uses all of it.
+#![allow(dead_code)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use npyz::NpyFile;
+
+pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_spectroll");
+
+pub(crate) fn spectroll(folder: &Path, arguments: &str) -> Output {
+    Command::new(PROGRAM).args(arguments.split_whitespace()).current_dir(folder).output().unwrap()
+}
+
+/// Standard output and error of a run that succeeds.
+pub(crate) fn succeeds(folder: &Path, arguments: &str) -> (String, String) {
+    let output = spectroll(folder, arguments);
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    let (out, err) = (text(output.stdout), text(output.stderr));
+    assert!(output.status.success(), "{arguments}: {err}");
+    (out, err)
+}
+
+/// A run that fails with this exit code and says this, and leaves no new file.
+pub(crate) fn fails(folder: &Path, arguments: &str, code: i32, message: &str) {
+    let before = files(folder);
+    let output = spectroll(folder, arguments);
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments}: {err}");
+    assert!(err.contains(message), "{arguments}: {err}");
+    assert!(!err.contains("panicked"), "{arguments}: {err}");
+    assert_eq!(files(folder), before, "{arguments} left something behind");
+}
+
+pub(crate) fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// Every file below a folder, with its bytes.
+pub(crate) fn tree(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut all = Vec::new();
+    for name in files(folder) {
+        let path = folder.join(&name);
+        match path.is_dir() {
+            true => {
+                all.extend(tree(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)))
+            }
+            false => all.push((name, fs::read(path).unwrap())),
+        }
+    }
+    all
+}
+
+pub(crate) fn npy(path: &Path) -> (Vec<u64>, Vec<f32>) {
+    let bytes = fs::read(path).unwrap();
+    let file = NpyFile::new(bytes.as_slice()).unwrap();
+    (file.shape().to_vec(), file.into_vec().unwrap())
+}
+
+/// What Python prints. SPECTROLL_PYTHON names one that has the readers of every format; `make test` makes one.
+pub(crate) fn python(folder: &Path, code: &str) -> String {
+    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let output = Command::new(python).args(["-W", "error", "-c", code]).current_dir(folder).output().unwrap();
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{code}\n{err}");
+    String::from_utf8(output.stdout).unwrap().trim().to_owned()
+}

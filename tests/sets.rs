@@ -1,0 +1,250 @@
+//! Sets of chunks: whatever happens while they are written, what comes to their name is what an undisturbed run makes.
+
+mod program;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use program::{PROGRAM, fails, files, spectroll, succeeds, tree};
+use rand::RngExt;
+use spectroll::Stream;
+
+const LAYOUTS: [&str; 3] = ["a.zarr", "a/ --format npy", "a/ --format parquet"];
+
+fn start(folder: &Path, arguments: &str) -> Child {
+    let mut command = Command::new(PROGRAM);
+    command.args(arguments.split_whitespace()).current_dir(folder).stderr(Stdio::null());
+    command.spawn().unwrap()
+}
+
+/// Whether the child ended by itself, and well, before so much time had passed; it is killed otherwise.
+fn ends_within(mut child: Child, time: Duration) -> bool {
+    let start = Instant::now();
+    while start.elapsed() < time {
+        if let Some(status) = child.try_wait().unwrap() {
+            assert!(status.success());
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap(); // SIGKILL
+    child.wait().unwrap();
+    false
+}
+
+#[test]
+fn killed_runs_go_on_to_the_same_bytes() {
+    let mut random = Stream::named(1, "kills").rng();
+    for layout in LAYOUTS {
+        let [whole, killed] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        let run = format!("sample munsell-vrhel -n 400000 --chunk 2000 --engine cpu --seed 5 -o {layout}");
+        let start_of_run = Instant::now();
+        succeeds(whole.path(), &run);
+        let time = start_of_run.elapsed();
+        let expected = tree(whole.path());
+
+        let (mut kills, mut completions) = (0, 0);
+        while kills < 20 {
+            let share = random.random_range(0.05..0.5);
+            if !ends_within(start(killed.path(), &format!("{run} --resume")), time.mul_f64(share)) {
+                kills += 1;
+            }
+            // A run may be killed after it has done all.
+            if let Some(set) = files(killed.path()).iter().find(|name| !name.ends_with(".partial")) {
+                completions += 1;
+                let same = tree(&killed.path().join(set)) == tree(&whole.path().join(set));
+                assert!(same, "{layout} after {kills} kills");
+                fs::remove_dir_all(killed.path().join(set)).unwrap();
+            }
+        }
+        succeeds(killed.path(), &format!("{run} --resume"));
+        assert!(tree(killed.path()) == expected, "{layout} in the end, after {completions} completions");
+        // Once more: there is nothing to do.
+        succeeds(killed.path(), &format!("{run} --resume"));
+        assert!(tree(killed.path()) == expected);
+    }
+}
+
+#[test]
+fn an_interrupt_keeps_what_is_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = "sample munsell-vrhel -n 3e8 --engine cpu -o a.zarr";
+    let mut command = Command::new(PROGRAM);
+    command.args(run.split_whitespace()).current_dir(folder.path()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    let chunk = folder.path().join("a.zarr.partial/spectra/c.1.0");
+    let waiting = Instant::now();
+    while !chunk.exists() {
+        assert!(waiting.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert!(err.contains("chunks are finished in \"a.zarr.partial\": pass --resume to go on"), "{err}");
+    fails(folder.path(), run, 1, "pass --resume to go on with it, or --force");
+}
+
+#[test]
+fn shards_at_once_make_the_bytes_of_one_process() {
+    let [whole, shared] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let run = "sample munsell-vrhel -n 200001 --chunk 3000 --engine cpu -o a.zarr";
+    succeeds(whole.path(), run);
+    let shards: Vec<_> = (1..=4).map(|i| start(shared.path(), &format!("{run} --shard {i}/4"))).collect();
+    for mut shard in shards {
+        assert!(shard.wait().unwrap().success());
+    }
+    assert_eq!(files(shared.path()), ["a.zarr"]);
+    assert!(tree(shared.path()) == tree(whole.path()));
+
+    // One after another, the last one's index from Kubernetes; and by hand what the last would have done itself.
+    let folder = tempfile::tempdir().unwrap();
+    let (_, err) = succeeds(folder.path(), &format!("{run} --shard 1/2"));
+    assert!(
+        err.contains("34 of 67 chunks are finished") || err.contains("33 of 67 chunks are finished"),
+        "{err}"
+    );
+    fails(folder.path(), "merge a.zarr", 1, "of 67 chunks are done");
+    let mut command = Command::new(PROGRAM);
+    command.args(format!("{run} --shard auto/2").split_whitespace()).env("JOB_COMPLETION_INDEX", "1");
+    assert!(command.current_dir(folder.path()).output().unwrap().status.success());
+    assert!(tree(folder.path()) == tree(whole.path()));
+    fails(folder.path(), &format!("{run} --shard 1/2"), 1, "exists already");
+}
+
+#[test]
+fn another_data_set_is_not_mixed_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let run =
+        |flags: &str| format!("sample munsell-vrhel -n 6000 --chunk 1000 --engine cpu -o a.zarr {flags}");
+    succeeds(folder, &run("--shard 1/2 --seed 1"));
+    for (flags, difference) in [
+        ("--seed 2", "seed is 1 there and 2 here"),
+        ("--seed 1 --lrv 0.5", "recipe.lrv is null there and 0.5 here"),
+        ("--seed 1 --dtype f16", "fields"),
+        ("--seed 1 --start 9", "start is 0 there and 9 here"),
+        ("--seed 1 --zstd", "zstd is null there and 3 here"),
+    ] {
+        for shard in ["--resume", "--shard 2/2"] {
+            fails(folder, &run(&format!("{flags} {shard}")), 1, difference);
+        }
+    }
+    let other = run("--seed 1 --resume").replace("munsell-vrhel", "granada");
+    fails(folder, &other, 1, "kind is \"reflectance\" there and \"illuminant\" here");
+    succeeds(folder, &run("--seed 1 --resume"));
+    fails(folder, &run("--seed 1"), 1, "exists already");
+    succeeds(folder, &run("--seed 2 --force"));
+    assert_eq!(files(folder), ["a.zarr"]);
+    fails(folder, &run("--seed 1 --resume"), 1, "seed is 2 there and 1 here");
+}
+
+#[test]
+fn a_flipped_bit_is_found() {
+    for layout in LAYOUTS {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        succeeds(folder, &format!("sample granada -n 5000 --chunk 700 --engine cpu -o {layout}"));
+        let set = files(folder).pop().unwrap();
+        let (_, err) = succeeds(folder, &format!("verify {set} --redraw 1"));
+        assert!(
+            err.contains("8 of 8 chunks are as they were written") && err.contains("8 of them drawn again"),
+            "{err}"
+        );
+        let all = tree(&folder.join(&set));
+        let (name, bytes) =
+            all.iter().find(|(name, _)| name.contains("c.3") || name.contains("-000003")).unwrap();
+        let path = folder.join(&set).join(name);
+        let mut flipped = bytes.clone();
+        flipped[bytes.len() / 2] ^= 16;
+        fs::write(&path, flipped).unwrap();
+        fails(folder, &format!("verify {set}"), 5, &format!("{name} does not match its BLAKE3 sum"));
+        fs::write(&path, &bytes[1..]).unwrap();
+        fails(folder, &format!("verify {set}"), 5, "bytes instead of");
+        fs::remove_file(&path).unwrap();
+        fails(folder, &format!("verify {set}"), 5, "is missing");
+        fails(
+            folder,
+            &format!("sample granada -n 5000 --chunk 700 --engine cpu -o {layout} --resume"),
+            5,
+            "damaged",
+        );
+    }
+    // Sums that were made to match are found by drawing again.
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "sample granada -n 500 --chunk 500 --engine cpu -o a.zarr");
+    let chunk = folder.join("a.zarr/spectra/c.0.0");
+    let mut bytes = fs::read(&chunk).unwrap();
+    let before = blake3::hash(&bytes).to_hex().to_string();
+    bytes[1000] ^= 1;
+    fs::write(&chunk, &bytes).unwrap();
+    let manifest = folder.join("a.zarr/manifest.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace(&before, blake3::hash(&bytes).to_hex().as_str())).unwrap();
+    succeeds(folder, "verify a.zarr --redraw 0");
+    fails(folder, "verify a.zarr", 5, "is not what is drawn now");
+    fails(folder, "verify .", 1, "has no manifest");
+}
+
+/// A disk of 3 MB. Where no file system may be mounted, there is nothing to see.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_keeps_what_was_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let disk = folder.path().join("disk");
+    fs::create_dir(&disk).unwrap();
+    let mount = |size: &str, options: &str| {
+        let mut command = Command::new("mount");
+        command.args(["-t", "tmpfs", "-o", &format!("{options}size={size}"), "tmpfs"]).arg(&disk);
+        command.output().is_ok_and(|output| output.status.success())
+    };
+    if !mount("3m", "") {
+        println!("skipped: no file system may be mounted here");
+        return;
+    }
+    let sample = "sample munsell-vrhel -n 100000 --engine cpu";
+    for format in ["npy", "npz", "csv", "h5", "mat", "parquet"] {
+        fails(&disk, &format!("{sample} -o a.{format}"), 1, "No space left on device");
+    }
+    let set = format!("{sample} --chunk 1000 -o a.zarr");
+    let output = spectroll(&disk, &set);
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && err.contains("No space left on device"), "{err}");
+    assert!(err.contains("pass --resume"), "{err}");
+    assert_eq!(files(&disk), ["a.zarr.partial"]);
+    assert!(mount("30m", "remount,"));
+    succeeds(&disk, &format!("{set} --resume"));
+    succeeds(&disk, "verify a.zarr --redraw 0.05");
+    assert!(Command::new("umount").arg(&disk).status().unwrap().success());
+}
+
+#[test]
+fn what_is_in_the_way_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("file.zarr"), "mine").unwrap();
+    fs::create_dir(folder.join("mine.zarr")).unwrap();
+    let sample = "sample granada -n 5 --engine cpu";
+    fails(folder, &format!("{sample} -o file.zarr"), 1, "is not a folder");
+    fails(folder, &format!("{sample} -o mine.zarr"), 1, "exists already");
+    fails(folder, &format!("{sample} -o mine.zarr --force"), 1, "is not a data set of this program");
+    fails(folder, &format!("{sample} -o mine.zarr --resume"), 1, "is not a data set of this program");
+    fails(folder, &format!("{sample} -o no/such.zarr"), 1, "create it first");
+    fails(folder, &format!("{sample} -o /proc/a.zarr"), 1, "cannot write \"/proc/a.zarr\"");
+    fails(folder, &format!("{sample} -o /proc/a.npy"), 1, "cannot write \"/proc/a.npy\"");
+    fails(folder, &format!("{sample} -o a.npy --resume"), 2, "--resume needs an output of many files");
+    fails(folder, &format!("{sample} -o a.npy --zstd"), 2, "--zstd is for .zarr");
+    fails(folder, &format!("{sample} -o a.zarr --chunk 0"), 2, "at least one draw");
+    fails(folder, &format!("{sample} -o a.zarr --shard 3/2"), 2, "no part 3 of 2");
+    fails(folder, &format!("{sample} -o a.zarr --shard auto"), 2, "neither is set");
+    fails(folder, &format!("{sample} -o a/ --format csv"), 2, "a folder holds parts");
+    let (out, _) = succeeds(folder, &format!("{sample} -o a.zarr --chunk 2 --dry-run"));
+    assert!(out.contains("spectra: [5, 31] float32") && out.contains("in 3 chunks of 2 draws"), "{out}");
+    assert_eq!(files(folder), ["file.zarr", "mine.zarr"]);
+    succeeds(folder, &format!("{sample} -o empty.zarr").replace("-n 5", "-n 0"));
+    succeeds(folder, "verify empty.zarr");
+}
