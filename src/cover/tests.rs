@@ -19,7 +19,11 @@ static SURFACES: LazyLock<Model> = LazyLock::new(|| Model::builtin("munsell-vrhe
 fn program(lrv: Option<f64>, covariance_scale: f64) -> Program {
     let weights = lrv_weights(SURFACES.grid()).unwrap();
     let target = lrv.map(|lrv| Target { lrv, weights, bounds: Bounds::Scaled });
-    Program { target, max_attempts: 1000, ..Program::new(&SURFACES, &program::weights(&SURFACES, covariance_scale)) }
+    Program {
+        target,
+        max_attempts: 1000,
+        ..Program::new(&SURFACES, &program::weights(&SURFACES, covariance_scale))
+    }
 }
 
 fn cover_of(program: &Program, boxes: usize) -> Cover {

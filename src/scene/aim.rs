@@ -204,10 +204,7 @@ fn uniform(word: u32) -> f64 {
     (f64::from(word) + 0.5) * 2f64.powi(-32)
 }
 
-fn built_condition(
-    builder: &RecipeBuilder,
-    weights: &Affine,
-) -> Result<Condition, (&'static str, Problem)> {
+fn built_condition(builder: &RecipeBuilder, weights: &Affine) -> Result<Condition, (&'static str, Problem)> {
     builder.condition(weights).map_err(|e| ("hue", Problem::Recipe(e)))
 }
 

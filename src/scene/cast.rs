@@ -91,7 +91,8 @@ pub enum Content {
 }
 
 impl Content {
-    fn suffix(self) -> &'static str {
+    /// What the name of such an array adds to that of its group.
+    pub fn suffix(self) -> &'static str {
         match self {
             Content::Spectra => "",
             Content::Intensity => "_intensity",

@@ -41,7 +41,7 @@ pub struct SceneDrawer<'a> {
 pub struct GroupSummary {
     /// The group.
     pub group: String,
-    /// What its draws took. Draws that serve all scenes count once.
+    /// What its draws took.
     #[serde(flatten)]
     pub summary: Summary,
 }
@@ -144,14 +144,28 @@ impl SceneDrawer<'_> {
         constants
     }
 
-    /// Draws some scenes and hands them to `sink` in order, window by window. The first error ends it.
+    /// What the draws took that serve all scenes, of each group.
+    pub fn taken_once(&self) -> Vec<GroupSummary> {
+        let summary = |(cast, once): (&Cast, &Option<Once>)| {
+            let mut summary = Summary::default();
+            if let (Some(once), Shapes::Once(drawing)) = (once, &cast.shapes) {
+                summary.count(&once.tallies[..drawing.places as usize]);
+            }
+            GroupSummary { group: cast.name.clone(), summary }
+        };
+        self.scene.casts.iter().zip(&self.once).map(summary).collect()
+    }
+
+    /// Draws some scenes and hands them to `sink` in order, window by window. The first error ends it. Returns what that
+    /// took, besides [`SceneDrawer::taken_once`].
     pub fn draw<E: From<EngineError>>(
         &mut self,
         scenes: Range<u64>,
         mut sink: impl FnMut(Window) -> Result<(), E>,
     ) -> Result<Vec<GroupSummary>, E> {
         let (scene, once) = (self.scene, &self.once);
-        let mut summaries = summaries(scene, once);
+        let none = |cast: &Cast| GroupSummary { group: cast.name.clone(), ..GroupSummary::default() };
+        let mut summaries: Vec<_> = scene.casts.iter().map(none).collect();
         let mut next = scenes.start;
         let mut window = |batches: &[Batch], count: u64| {
             let part = next..next + count;
@@ -194,17 +208,6 @@ impl SceneDrawer<'_> {
         }
         Ok(summaries)
     }
-}
-
-fn summaries(scene: &Scene, once: &[Option<Once>]) -> Vec<GroupSummary> {
-    let summary = |(cast, once): (&Cast, &Option<Once>)| {
-        let mut summary = Summary::default();
-        if let (Some(once), Shapes::Once(drawing)) = (once, &cast.shapes) {
-            summary.count(&once.tallies[..drawing.places as usize]);
-        }
-        GroupSummary { group: cast.name.clone(), summary }
-    };
-    scene.casts.iter().zip(once).map(summary).collect()
 }
 
 /// The columns of a group in some scenes.
