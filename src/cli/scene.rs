@@ -24,6 +24,7 @@ use super::{EngineArguments, Usage, check_interrupt, existing, grouped, request,
 /// An element of a group depends on the seed, the group's name, the scene and the element alone: groups may be added,
 /// removed and moved, and any scene drawn alone.
 #[derive(clap::Args)]
+#[command(mut_arg("output", |output| output.required(false)))] // a picture or a dry run will do
 pub(crate) struct Arguments {
     /// The scene file, in TOML
     #[arg(value_name = "FILE", required_unless_present = "example", conflicts_with = "example")]
