@@ -6,7 +6,7 @@ use rand::distr::Distribution;
 use rayon::prelude::*;
 
 use crate::colorimetry;
-use crate::cover::{Cover, Estimate};
+use crate::cover::Cover;
 use crate::cpu::Kernel;
 use crate::dataset::Kind;
 use crate::grid::Grid;
@@ -368,18 +368,22 @@ impl RecipeBuilder {
             }
             _ => None,
         };
-        let estimate = cover.as_ref().map(|cover| cover.estimate(Stream::named(0, "pilot"), PILOT));
-        let covered = cover.zip(estimate).filter(|(_, estimate)| Cover::pays(estimate.acceptance, plain));
-        if self.proposal == Proposal::Cover && covered.is_none() {
+        if self.proposal == Proposal::Cover && cover.is_none() {
             return Err(RecipeError::NoCover { components: program.components() });
         }
-        let mut recipe =
-            Recipe { model: self.model, program, probability: plain, acceptance: plain, cover: None };
-        if let Some((cover, Estimate { acceptance, probability, .. })) = covered {
-            recipe.program = recipe.program.covered(&cover);
-            recipe.cover = Some((cover.len(), cover.proposal().bytes()));
-            (recipe.probability, recipe.acceptance) = (probability, acceptance);
-        }
+        let covered = cover.map(|cover| (program.clone().covered(&cover), cover));
+        let covered = covered.map(|(program, cover)| (pilot(&program), program, cover));
+        let covered = covered.filter(|(acceptance, ..)| Cover::pays(*acceptance, plain));
+        let recipe = match covered {
+            Some((acceptance, program, cover)) => Recipe {
+                model: self.model,
+                program,
+                probability: acceptance * cover.mass(),
+                acceptance,
+                cover: Some((cover.len(), cover.proposal().bytes())),
+            },
+            None => Recipe { model: self.model, program, probability: plain, acceptance: plain, cover: None },
+        };
         if failure(recipe.acceptance, self.max_attempts) > TOLERABLE_FAILURE {
             let acceptance = recipe.acceptance;
             return Err(RecipeError::Hopeless { acceptance, max_attempts: self.max_attempts });
