@@ -168,6 +168,13 @@ impl Recipe {
         }
     }
 
+    /// The largest luminous reflectance that reflectances of a model can be scaled to and stay below 1, which none
+    /// quite reaches: from a linear program. `None` of illuminants, and of a grid without visible light.
+    pub fn largest_lrv(model: &Model) -> Option<f64> {
+        let weights = colorimetry::lrv_weights(model.grid()).filter(|_| model.kind() == Kind::Reflectance)?;
+        region::largest_lrv(&Program::new(model, 1.0), &weights)
+    }
+
     /// The model.
     pub fn model(&self) -> &Model {
         &self.model
