@@ -1,6 +1,8 @@
 //! CIE 1931 colorimetry on a grid: the only home of the colour matching functions, of D65, and of the weights that
 //! turn a reflectance into its luminous reflectance value (LRV).
 
+use nalgebra::{Matrix3, Vector3};
+
 use crate::dataset::Builtin;
 use crate::grid::{Extend, Grid, Spline};
 
@@ -59,6 +61,12 @@ pub fn linear_srgb(xyz: [f64; 3]) -> [f64; 3] {
     XYZ_TO_SRGB.map(|row| row.iter().zip(xyz).map(|(m, v)| m * v).sum())
 }
 
+/// XYZ relative to D65 white of linear Rec. 709 components: the inverse of [`linear_srgb`], to rounding.
+pub fn linear_srgb_to_xyz(linear: [f64; 3]) -> [f64; 3] {
+    let inverse = Matrix3::from_fn(|row, column| XYZ_TO_SRGB[row][column]).try_inverse();
+    (inverse.expect("the matrix has an inverse") * Vector3::from(linear)).into()
+}
+
 /// 8-bit sRGB of linear components (IEC 61966-2-1), which are clamped to 0..1.
 pub fn encode_srgb(linear: [f64; 3]) -> [u8; 3] {
     linear.map(|v| {
@@ -82,6 +90,13 @@ mod tests {
             assert!((cx - 0.3127).abs() < 5e-4 && (cy - 0.3290).abs() < 5e-4, "{grid}: {cx} {cy}");
             assert_eq!(encode_srgb(linear_srgb([0.9505, 1.0, 1.089])), [255; 3]);
         }
+    }
+
+    #[test]
+    fn components_and_tristimulus_values_are_inverses() {
+        let linear = [0.2, 0.7, 0.4];
+        let back = linear_srgb(linear_srgb_to_xyz(linear));
+        assert!(back.iter().zip(linear).all(|(a, b)| (a - b).abs() < 1e-14));
     }
 
     #[test]

@@ -11,6 +11,7 @@ pub mod colorimetry;
 mod fit;
 mod model;
 
+mod condition;
 mod program;
 mod quantity;
 mod region;
@@ -45,6 +46,8 @@ pub mod stress;
 
 #[cfg(feature = "report")]
 pub mod report;
+
+pub mod scene;
 
 pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
 pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, adapters};

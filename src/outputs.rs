@@ -3,7 +3,7 @@
 use crate::colorimetry;
 use crate::dataset::Kind;
 use crate::model::Model;
-use crate::program::{self, Affine, Output, Program, Source, Unit};
+use crate::program::{Affine, Output, Program, Source, Unit};
 use crate::quantity::{Element, Format, Layout, Quantity};
 use crate::recipe::{Luminance, RecipeError};
 
@@ -34,12 +34,12 @@ impl Default for Asked {
     }
 }
 
-/// What comes out of a program, each quantity once and in their order.
+/// What comes out of a program of these weights, each quantity once and in their order.
 pub(crate) fn outputs(
     asked: &Asked,
     model: &Model,
     program: &Program,
-    covariance_scale: f64,
+    weights: &Affine,
 ) -> Result<Vec<Output>, RecipeError> {
     let mut quantities = asked.quantities.clone();
     quantities.sort_unstable();
@@ -48,7 +48,7 @@ pub(crate) fn outputs(
         return Err(RecipeError::Nothing);
     }
     let output = |quantity| {
-        let source = source(quantity, asked, model, program, covariance_scale)?;
+        let source = source(quantity, asked, model, program, weights)?;
         let width = match &source {
             Source::Spectrum => program.bands(),
             Source::Map(map, _) => map.offset.len(),
@@ -73,14 +73,14 @@ fn source(
     asked: &Asked,
     model: &Model,
     program: &Program,
-    covariance_scale: f64,
+    weights: &Affine,
 ) -> Result<Source, RecipeError> {
     let unless = |reason| RecipeError::Quantity { quantity, reason };
     let scaled = if program.scales() { Unit::Scale } else { Unit::One };
     let k = program.components();
     Ok(match quantity {
         Quantity::Spectra => Source::Spectrum,
-        Quantity::Weights => Source::Map(program::weights(model, covariance_scale), Unit::One),
+        Quantity::Weights => Source::Map(weights.clone(), Unit::One),
         Quantity::Xyz | Quantity::Srgb => {
             let xyz = program.spectrum.project(&xyz_weights(asked, model)?);
             let unit = match (model.kind(), asked.luminance) {

@@ -128,13 +128,12 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// Draws of a model that are physical, of which nothing comes out yet.
-    pub(crate) fn new(model: &Model, covariance_scale: f64) -> Program {
-        let spectrum = weights(model, covariance_scale);
+    /// Draws of a model with these weights that are physical, of which nothing comes out yet.
+    pub(crate) fn new(model: &Model, weights: &Affine) -> Program {
         let parts = model.parts();
         let columns: Vec<_> =
             parts.basis.column_iter().map(|c| c.iter().copied().collect::<Vec<_>>()).collect();
-        let mut spectrum = spectrum.project(&columns);
+        let mut spectrum = weights.project(&columns);
         spectrum.offset.iter_mut().zip(&parts.mean).for_each(|(s, mean)| *s += mean);
         Program {
             kind: parts.kind,

@@ -6,6 +6,7 @@ use rand::distr::Distribution;
 use rayon::prelude::*;
 
 use crate::colorimetry;
+use crate::condition::Condition;
 use crate::cover::Cover;
 use crate::cpu::Kernel;
 use crate::dataset::Kind;
@@ -13,7 +14,7 @@ use crate::grid::Grid;
 use crate::model::Model;
 use crate::normal::Real;
 use crate::outputs::{Asked, outputs};
-use crate::program::{Affine, Bounds, Level, Program, Tally, Target};
+use crate::program::{self, Affine, Bounds, Level, Program, Tally, Target};
 use crate::quantity::{Element, Format, Layout, Quantity};
 use crate::region::{self, Room};
 use crate::stream::Stream;
@@ -57,6 +58,7 @@ pub enum Proposal {
 pub struct RecipeBuilder {
     model: Model,
     lrv: Option<f64>,
+    xyz: Option<[f64; 3]>,
     bounds: Bounds,
     covariance_scale: f64,
     intensity: Option<Intensity>,
@@ -102,6 +104,19 @@ pub enum RecipeError {
     Invisible(Grid),
     #[error("no reflectance of this model has a luminous reflectance of {lrv}: the largest is {largest:.6}")]
     UnreachableLrv { lrv: f64, largest: f64 },
+    #[error("tristimulus values of {0:?}: they must be finite, and Y above 0 and below 1")]
+    Xyz([f64; 3]),
+    #[error("target tristimulus values belong to reflectances, and this model is of illuminants")]
+    XyzOfIlluminant,
+    #[error("target tristimulus values say what the luminous reflectance is: leave the target for it out")]
+    XyzAndLrv,
+    #[error(
+        "target tristimulus values take 3 of the directions in which a model varies, and it needs 4 or more: fit it \
+         with more components"
+    )]
+    TooFewDirections,
+    #[error("{}", unreachable_xyz(*xyz, *nearest))]
+    UnreachableXyz { xyz: [f64; 3], nearest: Option<[f64; 3]> },
     #[error("an intensity of {0}: it must be above 0, finite and within what f32 holds")]
     Intensity(f64),
     #[error(
@@ -159,6 +174,7 @@ impl Recipe {
         RecipeBuilder {
             model: model.clone(),
             lrv: None,
+            xyz: None,
             bounds: Bounds::default(),
             covariance_scale: 1.0,
             intensity: None,
@@ -172,7 +188,7 @@ impl Recipe {
     /// quite reaches: from a linear program. `None` of illuminants, and of a grid without visible light.
     pub fn largest_lrv(model: &Model) -> Option<f64> {
         let weights = colorimetry::lrv_weights(model.grid()).filter(|_| model.kind() == Kind::Reflectance)?;
-        region::largest_lrv(&Program::new(model, 1.0), &weights)
+        region::largest_lrv(&Program::new(model, &program::weights(model, 1.0)), &weights)
     }
 
     /// The model.
@@ -308,6 +324,23 @@ impl RecipeBuilder {
         RecipeBuilder { lrv: Some(lrv), ..self }
     }
 
+    /// Gives every draw these tristimulus values under D65, where a perfect white has Y = 1: draws of the model's
+    /// Gaussian conditioned on them, of k - 3 dimensions, with the spectrum between 0 and 1. They are met to the
+    /// rounding of f32, within 1e-6.
+    ///
+    /// ```
+    /// use spectroll::{Model, Quantity, Recipe, Stream};
+    ///
+    /// let model = Model::builtin("munsell-vrhel")?;
+    /// let recipe = Recipe::new(&model).xyz([0.35, 0.3, 0.2]).quantities([Quantity::Xyz]).build()?;
+    /// let drawn = recipe.draw::<f32>(Stream::new(1), 0);
+    /// assert!((drawn.values(Quantity::Xyz)[0] - 0.35).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn xyz(self, xyz: [f64; 3]) -> Self {
+        RecipeBuilder { xyz: Some(xyz), ..self }
+    }
+
     /// What must lie between 0 and 1 where there is a target LRV.
     pub fn bounds(self, bounds: Bounds) -> Self {
         RecipeBuilder { bounds, ..self }
@@ -338,18 +371,19 @@ impl RecipeBuilder {
             return Err(RecipeError::MaxAttempts(self.max_attempts));
         }
         let target = self.lrv.map(|lrv| self.target(lrv)).transpose()?;
-        let mut program = Program {
-            target,
-            max_attempts: self.max_attempts,
-            ..Program::new(&self.model, self.covariance_scale)
-        };
+        let mut weights = program::weights(&self.model, self.covariance_scale);
+        if let Some(xyz) = self.xyz {
+            weights = self.condition(&weights)?.given(xyz, &weights);
+        }
+        let mut program =
+            Program { target, max_attempts: self.max_attempts, ..Program::new(&self.model, &weights) };
         let mut asked = self.outputs.clone();
         if let Some(intensity) = self.intensity {
             program = self.brighten(program, intensity)?;
             asked.fixed = if let Intensity::Fixed(value) = intensity { Some(value) } else { None };
         }
         check_scale(&program)?;
-        program.outputs = outputs(&asked, &self.model, &program, self.covariance_scale)?;
+        program.outputs = outputs(&asked, &self.model, &program, &weights)?;
         if let Some(target) = &program.target {
             let largest = region::largest_lrv(&program, &target.weights);
             if let Some(largest) = largest.filter(|&largest| target.lrv >= largest) {
@@ -359,6 +393,9 @@ impl RecipeBuilder {
         let half_spaces = region::half_spaces(&program);
         let within = match region::room(&half_spaces) {
             Room::None { bands } => {
+                if let Some(xyz) = self.xyz {
+                    return Err(RecipeError::UnreachableXyz { xyz, nearest: self.nearest(xyz) });
+                }
                 let wavelengths = bands.into_iter().map(|band| self.model.grid().wavelength(band)).collect();
                 return Err(RecipeError::Empty { wavelengths });
             }
@@ -401,6 +438,48 @@ impl RecipeBuilder {
     /// Whether a cover is to be tried.
     fn may_cover(&self, plain: f64) -> bool {
         self.proposal == Proposal::Auto && Cover::could_pay(plain)
+    }
+
+    /// What giving the tristimulus values does to this model.
+    pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
+        let [_, y, _] = self.xyz.unwrap_or([0.5; 3]);
+        if let Some(xyz) = self.xyz.filter(|xyz| !(xyz.iter().all(|v| v.is_finite()) && y > 0.0 && y < 1.0)) {
+            return Err(RecipeError::Xyz(xyz));
+        }
+        if self.model.kind() == Kind::Illuminant {
+            return Err(RecipeError::XyzOfIlluminant);
+        }
+        if self.lrv.is_some() {
+            return Err(RecipeError::XyzAndLrv);
+        }
+        let (_, xyz) = self.seen(weights)?;
+        Condition::new(&xyz).ok_or(RecipeError::TooFewDirections)
+    }
+
+    /// The program without a target, and the map of its tristimulus values under D65.
+    fn seen(&self, weights: &Affine) -> Result<(Program, Affine), RecipeError> {
+        let grid = self.model.grid();
+        let seen = colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+        let program = Program::new(&self.model, weights);
+        let xyz = program.spectrum.project(&seen);
+        Ok((program, xyz))
+    }
+
+    /// The nearest tristimulus values that can be drawn. The very nearest leave no room for a spectrum to vary in, so
+    /// these are a little of the way from there to those of the mean.
+    fn nearest(&self, xyz: [f64; 3]) -> Option<[f64; 3]> {
+        let weights = program::weights(&self.model, self.covariance_scale);
+        let (program, map) = self.seen(&weights).ok()?;
+        let nearest = region::nearest_xyz(&program, &map, xyz)?;
+        let steps = (0..16).map(|doublings| 1e-4 * f64::from(1 << doublings)).take_while(|&part| part < 1.0);
+        let inwards = |part| [0, 1, 2].map(|i| nearest[i] + part * (map.offset[i] - nearest[i]));
+        let rounded = steps.map(inwards).map(|xyz| xyz.map(|v| (v * 1e4).round() / 1e4));
+        let condition = self.condition(&weights).ok()?;
+        rounded.into_iter().find(|&xyz| {
+            let program = Program::new(&self.model, &condition.given(xyz, &weights));
+            !matches!(region::room(&region::half_spaces(&program)), Room::None { .. })
+                && failure(pilot(&program), self.max_attempts) <= TOLERABLE_FAILURE
+        })
     }
 
     fn brighten(&self, program: Program, intensity: Intensity) -> Result<Program, RecipeError> {
@@ -484,6 +563,17 @@ fn hopeless(acceptance: f64, max_attempts: u32) -> String {
     )
 }
 
+fn unreachable_xyz(xyz: [f64; 3], nearest: Option<[f64; 3]>) -> String {
+    let nearest = match nearest {
+        Some([x, y, z]) => format!(
+            "the nearest that can be drawn are X = {x}, Y = {y}, Z = {z} (by the largest of the differences)"
+        ),
+        None => "nor are any near them that can be drawn".to_owned(),
+    };
+    let [x, y, z] = xyz;
+    format!("no reflectance of this model has the tristimulus values X = {x}, Y = {y}, Z = {z}: {nearest}")
+}
+
 fn nanometres(wavelengths: &[f64]) -> String {
     wavelengths.iter().map(|w| format!("{w} nm")).collect::<Vec<_>>().join(", ")
 }
@@ -534,6 +624,11 @@ mod tests {
             (surface.clone().covariance_scale(1e6).proposal(Proposal::Plain), "none of 65536 was"),
             (surface.clone().covariance_scale(100.0).max_attempts(50), "allow at least"),
             (light.clone().lrv(0.5), "of illuminants"),
+            (light.clone().xyz([0.3; 3]), "of illuminants"),
+            (surface.clone().xyz([0.3, 1.0, 0.3]), "Y above 0 and below 1"),
+            (surface.clone().xyz([0.3, f64::NAN, 0.3]), "must be finite"),
+            (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
+            (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
         ] {
             let text = message(recipe);
             assert!(text.contains(part), "{text}");
@@ -543,6 +638,17 @@ mod tests {
         let attempts =
             advised.split("allow at least ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!(surface.covariance_scale(100.0).max_attempts(attempts).build().is_ok());
+    }
+
+    #[test]
+    fn tristimulus_values_out_of_reach_come_with_the_nearest() {
+        let surface = Recipe::new(&Model::builtin("munsell-vrhel").unwrap());
+        for xyz in [[0.1, 0.4, 0.05], [0.9, 0.3, 0.1], [0.95, 0.99, 1.07], [0.01, 0.02, 0.6]] {
+            let error = surface.clone().xyz(xyz).build().unwrap_err();
+            let RecipeError::UnreachableXyz { nearest: Some(nearest), .. } = error else { panic!("{error}") };
+            assert!(error.to_string().contains(&format!("Y = {}, Z", nearest[1])), "{error}");
+            assert!(surface.clone().xyz(nearest).build().is_ok(), "{error}");
+        }
     }
 
     #[test]

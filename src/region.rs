@@ -8,7 +8,7 @@
 use microlp::{ComparisonOp, OptimizationDirection, Problem, Variable};
 
 use crate::dataset::Kind;
-use crate::program::{Bounds, Program};
+use crate::program::{Affine, Bounds, Program};
 
 /// How far from the mean a draw may lie, in standard deviations of each component.
 pub(crate) const REACH: f64 = 13.0;
@@ -114,6 +114,36 @@ pub(crate) fn largest_lrv(program: &Program, weights: &[f64]) -> Option<f64> {
     Some(problem.solve().ok()?.into_solution().ok()?.objective())
 }
 
+/// The tristimulus values nearest to `target` that a spectrum within the bounds has, by the largest of the differences
+/// in X, Y and Z. `xyz` is the map of the tristimulus values.
+pub(crate) fn nearest_xyz(program: &Program, xyz: &Affine, target: [f64; 3]) -> Option<[f64; 3]> {
+    let mut problem = Problem::new(OptimizationDirection::Minimize);
+    let z: Vec<Variable> = xyz.gain.iter().map(|_| problem.add_var(0.0, (-REACH, REACH))).collect();
+    let distance = problem.add_var(1.0, (0.0, f64::INFINITY));
+    let terms = |coefficients: &[f64]| -> Vec<_> {
+        z.iter().copied().zip(coefficients.iter().copied()).filter(|(_, c)| c.abs() > NEGLIGIBLE).collect()
+    };
+    for bound in half_spaces(program) {
+        problem.add_constraint(terms(&bound.normal), ComparisonOp::Le, bound.room);
+    }
+    for (axis, target) in target.into_iter().enumerate() {
+        let value = xyz.value(axis);
+        let mut terms = terms(&value.gain.concat());
+        let difference = target - value.offset[0];
+        terms.push((distance, -1.0));
+        problem.add_constraint(&terms, ComparisonOp::Le, difference);
+        terms.last_mut().expect("it was pushed").1 = 1.0;
+        problem.add_constraint(&terms, ComparisonOp::Ge, difference);
+    }
+    let solution = problem.solve().ok()?.into_solution().ok()?;
+    let z: Vec<f64> = z.iter().map(|&z| solution.var_value(z)).collect();
+    Some(
+        [0, 1, 2].map(|axis| {
+            xyz.offset[axis] + xyz.gain.iter().zip(&z).map(|(gain, z)| gain[axis] * z).sum::<f64>()
+        }),
+    )
+}
+
 /// The bounds that a program's rule sets.
 pub(crate) fn half_spaces(program: &Program) -> Vec<HalfSpace> {
     let gains = |band: usize| program.spectrum.gain.iter().map(move |gain| gain[band]);
@@ -159,7 +189,7 @@ mod tests {
     }
     use crate::colorimetry::lrv_weights;
     use crate::model::Model;
-    use crate::program::{Affine, Target};
+    use crate::program::{self, Target};
 
     /// Reflectances of 3 bands that vary in one shape: 0.5 + 0.1 z, 0.5 + 0.2 z, 0.5 - 0.1 z.
     fn ramp(target: Option<(f64, Bounds)>) -> Program {
@@ -214,7 +244,7 @@ mod tests {
     fn the_largest_lrv_of_munsell_and_vrhel() {
         let model = Model::builtin("munsell-vrhel").unwrap();
         let weights = lrv_weights(model.grid()).unwrap();
-        let largest = largest_lrv(&Program::new(&model, 1.0), &weights).unwrap();
+        let largest = largest_lrv(&Program::new(&model, &program::weights(&model, 1.0)), &weights).unwrap();
         assert!((largest - 0.995928).abs() < 1e-6, "{largest}");
     }
 }

@@ -264,7 +264,7 @@ fn target(device: &Device) -> Target {
     }
 }
 
-fn filled_buffer(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
+pub(crate) fn filled_buffer(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
     let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: bytes.len() as u64,

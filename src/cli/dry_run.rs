@@ -65,7 +65,7 @@ fn rate(recipe: &Recipe, engine: &Engine) -> anyhow::Result<f64> {
 }
 
 /// Whether the disk has room.
-fn room(path: &Path, bytes: u64) -> anyhow::Result<String> {
+pub(super) fn room(path: &Path, bytes: u64) -> anyhow::Result<String> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         return Ok(format!("{folder:?} does not exist: create it first"));
@@ -76,7 +76,7 @@ fn room(path: &Path, bytes: u64) -> anyhow::Result<String> {
 }
 
 /// Bytes in the unit that suits them.
-fn size(bytes: u64) -> String {
+pub(super) fn size(bytes: u64) -> String {
     let units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"];
     let power = (bytes.max(1).ilog10() / 3) as usize;
     match power {

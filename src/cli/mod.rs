@@ -9,10 +9,12 @@ mod fit;
 mod generate;
 mod inspect;
 mod picture;
+mod preview;
 mod progress;
 mod report;
 mod request;
 mod sample;
+mod scene;
 mod shader;
 mod shard;
 mod sink;
@@ -25,6 +27,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use spectroll::output::{Existing, OutputError};
+use spectroll::scene::SceneError;
 use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, RecipeError, TextError};
 
 /// Draws random, physically valid natural spectra on the GPU.
@@ -45,6 +48,7 @@ Examples:
   spectroll sample munsell-vrhel -n 10000 --lrv 0.4 --bounds scaled -o targets.npy
   spectroll sample munsell-vrhel -n 1000000 -o reflectances.zarr --zstd
   spectroll verify reflectances.zarr
+  spectroll scene --example condition3 --scenes 0..10 -o scenes.npz --preview scenes.png
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
   spectroll shader granada --quantities srgb --prefix sun > sun.wgsl
   spectroll inspect munsell-vrhel -o munsell-vrhel.png
@@ -57,6 +61,7 @@ Exit codes: 0 done, 1 failed while running, 2 wrong usage or impossible request,
 enum Command {
     Fit(fit::Arguments),
     Sample(sample::Arguments),
+    Scene(scene::Arguments),
     Verify(verify::VerifyArguments),
     Merge(verify::MergeArguments),
     Inspect(inspect::Arguments),
@@ -149,6 +154,7 @@ fn run(command: Command) -> anyhow::Result<()> {
     match &command {
         Command::Fit(arguments) => fit::run(arguments),
         Command::Sample(arguments) => sample::run(arguments),
+        Command::Scene(arguments) => scene::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),
         Command::Merge(arguments) => verify::join(arguments),
         Command::Inspect(arguments) => inspect::run(arguments),
@@ -171,7 +177,11 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         4
     } else if error.is::<Unverified>() || matches!(error.downcast_ref(), Some(OutputError::Damaged { .. })) {
         5
-    } else if error.is::<RecipeError>() || error.is::<TextError>() || error.is::<Usage>() {
+    } else if error.is::<RecipeError>()
+        || error.is::<SceneError>()
+        || error.is::<TextError>()
+        || error.is::<Usage>()
+    {
         2
     } else {
         1

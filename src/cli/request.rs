@@ -179,6 +179,8 @@ pub(super) fn schema(recipe: &Recipe, count: u64, stored: Element) -> Schema {
     };
     Schema {
         fields: recipe.formats().into_iter().map(|format| field(format).stored_as(stored)).collect(),
+        row: "draw".to_owned(),
+        constants: Vec::new(),
         count,
         wavelengths: recipe.model().grid().wavelengths().collect(),
         attributes: Map::new(),

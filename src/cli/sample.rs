@@ -153,7 +153,12 @@ fn draw(
     if !is_set {
         watch_interrupts();
     }
-    let mut sink = arguments.output.open(target, &schema, spd, (&model, &request::engine_name(engine)))?;
+    let mut sink = arguments.output.open(
+        target,
+        &schema,
+        spd,
+        (&[("model.json", &model)], &request::engine_name(engine)),
+    )?;
     if is_set {
         watch_interrupts();
     }

@@ -42,7 +42,7 @@ pub(super) struct OutputArguments {
     resume: bool,
     /// Replace what exists
     #[arg(long, conflicts_with_all = ["resume", "shard"])]
-    force: bool,
+    pub(super) force: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -165,13 +165,13 @@ impl OutputArguments {
         }
     }
 
-    /// Opens the target. `model` is the text of its file, which lies beside the chunks of a set; `engine` draws.
+    /// Opens the target. `companions` are files that lie beside the chunks of a set, by name; `engine` draws.
     pub(super) fn open(
         &self,
         target: Target,
         schema: &Schema,
         (name, first): (SpdName, u64),
-        (model, engine): (&str, &str),
+        (companions, engine): (&[(&str, &str)], &str),
     ) -> anyhow::Result<Sink> {
         let (path, existing) = (self.output.as_path(), existing(self.force));
         Ok(match target {
@@ -181,8 +181,7 @@ impl OutputArguments {
             Target::Set(layout) => {
                 let shard = self.shard.map_or(Ok(Shard::WHOLE), ShardName::resolve)?;
                 let plan = self.plan(layout, schema);
-                let companions = [("model.json", model)];
-                let set = SetWriter::open(path, plan, &companions, (shard, self.start()), engine)?;
+                let set = SetWriter::open(path, plan, companions, (shard, self.start()), engine)?;
                 Sink::Set(Box::new(set))
             }
         })

@@ -106,8 +106,9 @@ impl Redrawing {
         let unusable = || format!("{:?} does not say how it was drawn; pass --redraw 0", arguments.path);
         let text = |name: &str| attributes.get(name).and_then(Value::as_str).with_context(unusable);
         let number = |name: &str| attributes.get(name).and_then(Value::as_u64).with_context(unusable);
+        let sum = text("model_blake3")?;
         let model = Model::load(&arguments.path.join("model.json"))?;
-        if model_sum(&model) != text("model_blake3")? {
+        if model_sum(&model) != sum {
             return Err(
                 Unverified(format!("{:?}: model.json is not what was written", arguments.path)).into()
             );

@@ -6,7 +6,7 @@ use super::*;
 use crate::colorimetry::lrv_weights;
 use crate::model::Model;
 use crate::normal::Real;
-use crate::program::{Affine, Bounds, Program, Target};
+use crate::program::{self, Affine, Bounds, Program, Target};
 use crate::region::{Room, half_spaces, room};
 use crate::stream::StreamRng;
 use rand::Rng;
@@ -19,7 +19,11 @@ static SURFACES: LazyLock<Model> = LazyLock::new(|| Model::builtin("munsell-vrhe
 fn program(lrv: Option<f64>, covariance_scale: f64) -> Program {
     let weights = lrv_weights(SURFACES.grid()).unwrap();
     let target = lrv.map(|lrv| Target { lrv, weights, bounds: Bounds::Scaled });
-    Program { target, max_attempts: 1000, ..Program::new(&SURFACES, covariance_scale) }
+    Program {
+        target,
+        max_attempts: 1000,
+        ..Program::new(&SURFACES, &program::weights(&SURFACES, covariance_scale))
+    }
 }
 
 fn cover_of(program: &Program, boxes: usize) -> Cover {
@@ -285,7 +289,7 @@ fn what_pays_is_what_costs_less() {
 fn intervals_and_free_axes_are_covered() {
     let one = |gain: Vec<Vec<f64>>| Program {
         spectrum: Affine { offset: vec![0.5; 3], gain },
-        ..Program::new(&SURFACES, 1.0)
+        ..Program::new(&SURFACES, &program::weights(&SURFACES, 1.0))
     };
     // |z| < 2.5, of probability 0.98758.
     let interval = cover_of(&one(vec![vec![0.1, 0.2, -0.1]]), BOXES);

@@ -3,109 +3,129 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
-use super::{Batch, EngineError, Pace};
+use super::{Batch, EngineError, Member, Pace, Window};
 use crate::cpu::{self, Kernel};
 use crate::quantity::{Format, Quantity};
-use crate::recipe::Recipe;
 use crate::stream::Draws;
 
 /// How many windows there are: one with the caller, one being computed, one between them.
 const WINDOWS: usize = 3;
 
-/// The words of each output.
-type Window = Vec<Vec<u32>>;
+/// The words of each output of each member.
+type Room = Vec<Vec<Vec<u32>>>;
 
 pub(super) struct Drawer<'a> {
     pool: &'a rayon::ThreadPool,
-    recipe: &'a Recipe,
+    members: Vec<Role>,
+    pace: Pace,
+    /// Windows that were used before: memory that the system has given already.
+    rooms: Vec<Room>,
+}
+
+/// A member of the ensemble.
+struct Role {
     kernel: Kernel<f32>,
     formats: Vec<Format>,
-    /// Windows that were used before: memory that the system has given already.
-    windows: Vec<Window>,
+    per_step: u64,
 }
 
 impl<'a> Drawer<'a> {
-    pub(super) fn new(pool: &'a rayon::ThreadPool, recipe: &'a Recipe) -> Self {
-        let program = recipe.program().tallied();
-        let formats = program.outputs.iter().map(|output| output.format).collect();
-        Drawer { pool, recipe, kernel: Kernel::new(&program), formats, windows: Vec::new() }
+    pub(super) fn new(pool: &'a rayon::ThreadPool, members: &[Member]) -> Self {
+        let role = |member: &Member| {
+            let program = member.recipe.program().tallied();
+            let formats = program.outputs.iter().map(|output| output.format).collect();
+            Role { kernel: Kernel::new(&program), formats, per_step: member.per_step }
+        };
+        let roles: Vec<_> = members.iter().map(role).collect();
+        let pace = Pace::new(members, roles.iter().map(|role| role.formats.as_slice()), u64::MAX);
+        Drawer { pool, members: roles, pace, rooms: Vec::new() }
     }
 
-    /// Makes `draws` with their spectra in the caller's memory, which has as many words as they need, and hands them to
-    /// `sink` as one batch.
+    /// Makes `draws` of the only member with their spectra in the caller's memory, which has as many words as they
+    /// need, and hands them to `sink` as one batch.
     pub(super) fn fill<E>(
         &mut self,
         draws: Draws,
         spectra: &mut [u32],
         sink: &mut impl FnMut(Batch) -> Result<(), E>,
     ) -> Result<(), E> {
+        let Role { kernel, formats, .. } = &self.members[0];
         let words = |format: &Format| format.bytes(draws.count).div_ceil(4) as usize;
         let is_spectra = |format: &&Format| format.quantity == Quantity::Spectra;
         let mut others: Vec<_> =
-            self.formats.iter().filter(|f| !is_spectra(f)).map(|format| vec![0; words(format)]).collect();
+            formats.iter().filter(|f| !is_spectra(f)).map(|format| vec![0; words(format)]).collect();
         let mut spectra = Some(spectra);
         let mut rest = others.iter_mut();
         let mut arrays: Vec<&mut [u32]> = Vec::new();
-        for format in &self.formats {
+        for format in formats {
             arrays.push(match is_spectra(&format) {
                 true => spectra.take().expect("each quantity is there once"),
                 false => rest.next().expect("there is one for each"),
             });
         }
-        self.pool.install(|| cpu::fill(&self.kernel, draws, &mut arrays));
-        sink(Batch::new(draws, &self.formats, arrays.iter().map(|words| bytemuck::cast_slice(words))))
+        self.pool.install(|| cpu::fill(kernel, draws, &mut arrays));
+        sink(Batch::new(draws, formats, arrays.iter().map(|words| bytemuck::cast_slice(words))))
     }
 
     pub(super) fn draw<E: From<EngineError>>(
         &mut self,
-        draws: Draws,
-        sink: &mut impl FnMut(Batch) -> Result<(), E>,
+        draws: &[Draws],
+        steps: u64,
+        sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
         let (full, filled) = sync_channel(WINDOWS);
         let (empty, emptied) = sync_channel(WINDOWS);
-        self.windows.resize_with(WINDOWS, || vec![Vec::new(); self.formats.len()]);
-        for window in self.windows.drain(..) {
-            empty.send(window).expect("there is room, and a receiver");
+        let members = &self.members;
+        self.rooms
+            .resize_with(WINDOWS, || members.iter().map(|m| vec![Vec::new(); m.formats.len()]).collect());
+        for room in self.rooms.drain(..) {
+            empty.send(room).expect("there is room, and a receiver");
         }
-        let (pool, kernel, formats) = (self.pool, &self.kernel, &self.formats);
-        let pace = Pace::new(self.recipe, formats, u64::MAX);
+        let (pool, pace) = (self.pool, &mut self.pace);
         std::thread::scope(|scope| {
-            let computing = scope.spawn(move || compute(pool, kernel, formats, pace, draws, emptied, full));
+            let computing = scope.spawn(move || compute(pool, members, pace, (draws, steps), emptied, full));
             // Dropped before the thread is waited for, which might itself be waiting for a window.
             let empty = empty;
-            for (part, window) in filled {
-                sink(Batch::new(part, formats, window.iter().map(|words| bytemuck::cast_slice(words))))?;
-                let _ = empty.send(window); // nobody fills it after the last
+            for (window, room) in filled {
+                let members = members.iter().zip(draws).zip(&room);
+                let batches = members.map(|((member, draws), words)| {
+                    let arrays = words.iter().map(|words| bytemuck::cast_slice(words));
+                    Batch::new(window.of(*draws, member.per_step), &member.formats, arrays)
+                });
+                sink(&batches.collect::<Vec<_>>())?;
+                let _ = empty.send(room); // nobody fills it after the last
             }
             let emptied = computing.join().expect("computing does not panic");
-            self.windows.extend(emptied.try_iter());
+            self.rooms.extend(emptied.try_iter());
             Ok(())
         })
     }
 }
 
-/// Fills windows until all draws are made, or the caller has gone. Returns where the windows come back to.
+/// Fills windows until all steps are made, or the caller has gone. Returns where the windows come back to.
 fn compute(
     pool: &rayon::ThreadPool,
-    kernel: &Kernel<f32>,
-    formats: &[Format],
-    mut pace: Pace,
-    draws: Draws,
-    emptied: Receiver<Window>,
-    full: SyncSender<(Draws, Window)>,
-) -> Receiver<Window> {
+    members: &[Role],
+    pace: &mut Pace,
+    (draws, steps): (&[Draws], u64),
+    emptied: Receiver<Room>,
+    full: SyncSender<(Window, Room)>,
+) -> Receiver<Room> {
     let mut offset = 0;
-    while let Some(part) = pace.window(draws, offset) {
-        let Ok(mut window) = emptied.recv() else { break };
+    while let Some(window) = pace.window(steps, offset) {
+        let Ok(mut room) = emptied.recv() else { break };
         let start = Instant::now();
-        for (format, words) in formats.iter().zip(&mut window) {
-            words.resize(format.bytes(part.count).div_ceil(4) as usize, 0);
+        for ((member, draws), arrays) in members.iter().zip(draws).zip(&mut room) {
+            let part = window.of(*draws, member.per_step);
+            for (format, words) in member.formats.iter().zip(&mut *arrays) {
+                words.resize(format.bytes(part.count).div_ceil(4) as usize, 0);
+            }
+            let mut arrays: Vec<_> = arrays.iter_mut().map(Vec::as_mut_slice).collect();
+            pool.install(|| cpu::fill(&member.kernel, part, &mut arrays));
         }
-        let mut arrays: Vec<_> = window.iter_mut().map(Vec::as_mut_slice).collect();
-        pool.install(|| cpu::fill(kernel, part, &mut arrays));
-        pace.learn(part.count, start);
-        offset += part.count;
-        if full.send((part, window)).is_err() {
+        pace.learn(window.steps, start);
+        offset += window.steps;
+        if full.send((window, room)).is_err() {
             break;
         }
     }

@@ -6,8 +6,7 @@ use std::time::Instant;
 
 use wgpu::{BufferUsages, Features, PollType};
 
-use super::{Adapter, Batch, EngineError, Pace};
-use crate::recipe::Recipe;
+use super::{Adapter, Batch, EngineError, Member, Pace, Window};
 use crate::sampler::{Prepared, Sampler};
 use crate::stream::Draws;
 
@@ -94,61 +93,85 @@ impl Gpu {
     }
 }
 
-/// A recipe on a device.
+/// The recipes of an ensemble on a device.
 pub(super) struct Drawer<'a> {
     gpu: &'a Gpu,
-    sampler: Sampler,
+    members: Vec<Role>,
     pace: Pace,
     /// The windows that are not in flight.
     slots: Vec<Slot>,
-    /// How many draws each has room for.
+    /// How many steps each has room for.
     capacity: u64,
 }
 
+/// A member of the ensemble.
+struct Role {
+    sampler: Sampler,
+    per_step: u64,
+}
+
 impl<'a> Drawer<'a> {
-    pub(super) fn new(gpu: &'a Gpu, recipe: &Recipe) -> Result<Self, EngineError> {
-        let sampler = Sampler::of(&gpu.device, &recipe.program().tallied())?;
-        let pace = Pace::new(recipe, sampler.formats(), sampler.max_count(&gpu.device.limits()));
-        Ok(Drawer { gpu, sampler, pace, slots: Vec::new(), capacity: 0 })
+    pub(super) fn new(gpu: &'a Gpu, members: &[Member]) -> Result<Self, EngineError> {
+        let mut roles: Vec<Role> = Vec::new();
+        for (i, member) in members.iter().enumerate() {
+            let program = member.recipe.program();
+            let sampler = match members[..i].iter().position(|other| other.recipe.program() == program) {
+                Some(other) => roles[other].sampler.clone(),
+                None => Sampler::of(&gpu.device, &program.tallied())?,
+            };
+            roles.push(Role { sampler, per_step: member.per_step });
+        }
+        let limits = gpu.device.limits();
+        let most = roles.iter().map(|role| role.sampler.max_count(&limits) / role.per_step).min();
+        let pace = Pace::new(
+            members,
+            roles.iter().map(|role| role.sampler.formats()),
+            most.expect("an ensemble has members"),
+        );
+        Ok(Drawer { gpu, members: roles, pace, slots: Vec::new(), capacity: 0 })
     }
 
     pub(super) fn draw<E: From<EngineError>>(
         &mut self,
-        draws: Draws,
-        sink: &mut impl FnMut(Batch) -> Result<(), E>,
+        draws: &[Draws],
+        steps: u64,
+        sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
-        self.make_room(draws)?;
+        self.make_room(draws, steps)?;
         let mut flying = VecDeque::new();
         let mut offset = 0;
         let mut last_end = None;
         loop {
-            while let Some(part) = self.pace.window(draws, offset) {
+            while let Some(window) = self.pace.window(steps, offset) {
                 let Some(slot) = self.slots.pop() else { break };
-                flying.push_back(slot.submit(self.gpu, part));
-                offset += part.count;
+                let parts = self.members.iter().zip(draws);
+                let parts = parts.map(|(member, draws)| window.of(*draws, member.per_step)).collect();
+                flying.push_back((window, slot.submit(self.gpu, parts)));
+                offset += window.steps;
             }
-            let Some(flight) = flying.pop_front() else { return Ok(()) };
+            let Some((window, flight)) = flying.pop_front() else { return Ok(()) };
             let waited = self.gpu.land(&flight)?;
             // A window that was not waited for says nothing of the device, but that the caller sets the pace; the
             // first says how long the shader took to compile, and the last is but a remainder.
-            let is_last = flying.is_empty() && offset == draws.count;
+            let is_last = flying.is_empty() && offset == steps;
             if let Some(start) = last_end.filter(|_| waited && !is_last) {
-                self.pace.learn(flight.draws.count, start);
+                self.pace.learn(window.steps, start);
             }
             last_end = Some(Instant::now());
             self.slots.push(flight.read(sink)?);
         }
     }
 
-    /// Sees to it that there are slots for the windows of `draws`. An error while drawing loses some.
-    fn make_room(&mut self, draws: Draws) -> Result<(), EngineError> {
-        let needed = self.pace.most.min(draws.count);
+    /// Sees to it that there are slots for the windows of so many steps. An error while drawing loses some.
+    fn make_room(&mut self, draws: &[Draws], steps: u64) -> Result<(), EngineError> {
+        let needed = self.pace.most.min(steps);
         if self.capacity < needed {
             self.slots.clear();
             self.capacity = needed;
         }
+        let window = Window { offset: 0, steps: self.capacity };
         while self.slots.len() < RING {
-            self.slots.push(Slot::new(self.gpu, &self.sampler, draws.part(0, self.capacity))?);
+            self.slots.push(Slot::new(self.gpu, &self.members, draws, window)?);
         }
         Ok(())
     }
@@ -156,7 +179,8 @@ impl<'a> Drawer<'a> {
 
 /// Buffers for one window.
 struct Slot {
-    prepared: Prepared,
+    /// One a member.
+    prepared: Vec<Prepared>,
     /// Copies of the buffers that the host can map, where it cannot map the originals.
     staging: Option<Vec<wgpu::Buffer>>,
 }
@@ -164,16 +188,20 @@ struct Slot {
 /// A window that was submitted.
 struct Flight {
     slot: Slot,
-    draws: Draws,
+    /// Those of each member.
+    draws: Vec<Draws>,
     submission: wgpu::SubmissionIndex,
     /// What mapping each buffer came to.
     mapped: Vec<Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>>,
 }
 
 impl Slot {
-    fn new(gpu: &Gpu, sampler: &Sampler, capacity: Draws) -> Result<Slot, EngineError> {
+    fn new(gpu: &Gpu, members: &[Role], draws: &[Draws], window: Window) -> Result<Slot, EngineError> {
         let usage = if gpu.shared_memory { BufferUsages::MAP_READ } else { BufferUsages::COPY_SRC };
-        let prepared = sampler.prepare_for(&gpu.device, capacity, usage)?;
+        let prepare = |(member, draws): (&Role, &Draws)| {
+            member.sampler.prepare_for(&gpu.device, window.of(*draws, member.per_step), usage)
+        };
+        let prepared = members.iter().zip(draws).map(prepare).collect::<Result<Vec<_>, _>>()?;
         let copy = |buffer: &wgpu::Buffer| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("spectroll staging"),
@@ -182,16 +210,20 @@ impl Slot {
                 mapped_at_creation: false,
             })
         };
-        let staging = (!gpu.shared_memory).then(|| prepared.buffers().iter().map(copy).collect());
+        let staging =
+            (!gpu.shared_memory).then(|| prepared.iter().flat_map(Prepared::buffers).map(copy).collect());
         Ok(Slot { prepared, staging })
     }
 
-    fn submit(mut self, gpu: &Gpu, draws: Draws) -> Flight {
-        self.prepared.turn_to(&gpu.queue, draws);
+    fn submit(mut self, gpu: &Gpu, draws: Vec<Draws>) -> Flight {
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("spectroll") };
         let mut encoder = gpu.device.create_command_encoder(&descriptor);
-        self.prepared.record(&mut encoder);
-        for (from, to) in self.prepared.buffers().iter().zip(self.staging.iter().flatten()) {
+        for (prepared, draws) in self.prepared.iter_mut().zip(&draws) {
+            prepared.turn_to(&gpu.queue, *draws);
+            prepared.record(&mut encoder);
+        }
+        let drawn = self.prepared.iter().flat_map(Prepared::buffers);
+        for (from, to) in drawn.zip(self.staging.iter().flatten()) {
             encoder.copy_buffer_to_buffer(from, 0, to, 0, None);
         }
         let submission = gpu.queue.submit([encoder.finish()]);
@@ -201,13 +233,16 @@ impl Slot {
             buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(callback_state.set(result)));
             state
         };
-        let mapped = self.readable().iter().map(map).collect();
+        let mapped = self.readable().map(map).collect();
         Flight { slot: self, draws, submission, mapped }
     }
 
     /// The buffers, where the host maps them.
-    fn readable(&self) -> &[wgpu::Buffer] {
-        self.staging.as_deref().unwrap_or(self.prepared.buffers())
+    fn readable(&self) -> impl Iterator<Item = &wgpu::Buffer> {
+        let originals = self.prepared.iter().flat_map(Prepared::buffers);
+        // One of the two is empty.
+        let originals = originals.take(if self.staging.is_some() { 0 } else { usize::MAX });
+        self.staging.iter().flatten().chain(originals)
     }
 }
 
@@ -218,15 +253,19 @@ impl Flight {
     }
 
     /// Hands a window that has landed to `sink`.
-    fn read<E>(self, sink: &mut impl FnMut(Batch) -> Result<(), E>) -> Result<Slot, E> {
-        let buffers = self.slot.readable();
+    fn read<E>(self, sink: &mut impl FnMut(&[Batch]) -> Result<(), E>) -> Result<Slot, E> {
         {
             let view = |buffer: &wgpu::Buffer| buffer.get_mapped_range(..).expect("it has landed");
-            let views: Vec<_> = buffers.iter().map(view).collect();
-            let arrays = views.iter().map(|view| &view[..]);
-            sink(Batch::new(self.draws, self.slot.prepared.formats(), arrays))?;
+            let views: Vec<_> = self.slot.readable().map(view).collect();
+            let mut arrays = views.iter().map(|view| &view[..]);
+            let members = self.slot.prepared.iter().zip(&self.draws);
+            let batches = members.map(|(prepared, draws)| {
+                let formats = prepared.formats();
+                Batch::new(*draws, formats, arrays.by_ref().take(formats.len()).collect::<Vec<_>>())
+            });
+            sink(&batches.collect::<Vec<_>>())?;
         }
-        buffers.iter().for_each(wgpu::Buffer::unmap);
+        self.slot.readable().for_each(wgpu::Buffer::unmap);
         Ok(self.slot)
     }
 }

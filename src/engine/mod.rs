@@ -65,6 +65,11 @@ pub enum EngineError {
         "draw {index} found no acceptable candidate in {attempts} attempts: allow more, or ask for less extreme spectra"
     )]
     Exhausted { index: u64, attempts: u32 },
+    #[error(
+        "number {element} of {group:?} in scene {scene} found no acceptable candidate in {attempts} attempts: allow \
+         more, or ask for less extreme spectra"
+    )]
+    ExhaustedInScene { group: String, scene: u64, element: u64, attempts: u32 },
 }
 
 fn available(found: &[Adapter]) -> String {
@@ -188,10 +193,15 @@ impl Summary {
             let index = batch.draws.first.wrapping_add(failed as u64);
             return Err(EngineError::Exhausted { index, attempts: max_attempts });
         }
-        self.draws += batch.draws.count;
-        self.attempts += batch.tallies().iter().map(|t| u64::from(t.attempts())).sum::<u64>();
-        self.above_one += batch.tallies().iter().filter(|t| t.above_one()).count() as u64;
+        self.count(batch.tallies());
         Ok(())
+    }
+
+    /// Adds draws that succeeded.
+    pub(crate) fn count(&mut self, tallies: &[Tally]) {
+        self.draws += tallies.len() as u64;
+        self.attempts += tallies.iter().map(|t| u64::from(t.attempts())).sum::<u64>();
+        self.above_one += tallies.iter().filter(|t| t.above_one()).count() as u64;
     }
 }
 
@@ -240,11 +250,15 @@ impl Engine {
     /// Gets ready to draw from a recipe: what that takes (a compiled shader, buffers) is paid once, and serves any
     /// number of [`Drawer::draw`].
     pub fn drawer<'a>(&'a self, recipe: &'a Recipe) -> Result<Drawer<'a>, EngineError> {
-        let way = match &self.device {
-            Device::Gpu(gpu) => Way::Gpu(gpu::Drawer::new(gpu, recipe)?),
-            Device::Cpu(pool) => Way::Cpu(cpu::Drawer::new(pool, recipe)),
-        };
-        Ok(Drawer { recipe, way })
+        Ok(Drawer { recipe, ensemble: self.ensemble(&[Member { recipe, per_step: 1 }])? })
+    }
+
+    /// Gets ready to draw from several recipes at once. Members of one recipe share its shader.
+    pub(crate) fn ensemble(&self, members: &[Member]) -> Result<Ensemble<'_>, EngineError> {
+        Ok(Ensemble(match &self.device {
+            Device::Gpu(gpu) => Way::Gpu(gpu::Drawer::new(gpu, members)?),
+            Device::Cpu(pool) => Way::Cpu(cpu::Drawer::new(pool, members)),
+        }))
     }
 
     /// Makes `draws` and hands them to `sink` in order, as [`Drawer::draw`] does, which is what to use for more than
@@ -273,12 +287,7 @@ impl Engine {
 /// An engine with a recipe. See [`Engine::drawer`].
 pub struct Drawer<'a> {
     recipe: &'a Recipe,
-    way: Way<'a>,
-}
-
-enum Way<'a> {
-    Gpu(gpu::Drawer<'a>),
-    Cpu(cpu::Drawer<'a>),
+    ensemble: Ensemble<'a>,
 }
 
 impl Drawer<'_> {
@@ -305,13 +314,13 @@ impl Drawer<'_> {
         );
         let mut summary = Summary::default();
         let max_attempts = self.recipe.program().max_attempts;
-        match &mut self.way {
+        match &mut self.ensemble.0 {
             _ if draws.count == 0 => {}
             Way::Gpu(drawer) => {
                 let mut rest = spectra;
-                drawer.draw(draws, &mut |batch: Batch| {
-                    summary.add(&batch, max_attempts)?;
-                    let values = batch.spectra();
+                drawer.draw(&[draws], draws.count, &mut |batches: &[Batch]| {
+                    summary.add(&batches[0], max_attempts)?;
+                    let values = batches[0].spectra();
                     let (window, after) = std::mem::take(&mut rest).split_at_mut(values.len());
                     window.copy_from_slice(values);
                     rest = after;
@@ -333,16 +342,44 @@ impl Drawer<'_> {
     ) -> Result<Summary, E> {
         let mut summary = Summary::default();
         let max_attempts = self.recipe.program().max_attempts;
-        let mut checked = |batch: Batch| {
-            summary.add(&batch, max_attempts)?;
-            sink(batch)
-        };
-        match &mut self.way {
-            _ if draws.count == 0 => {}
-            Way::Gpu(drawer) => drawer.draw(draws, &mut checked)?,
-            Way::Cpu(drawer) => drawer.draw(draws, &mut checked)?,
-        }
+        self.ensemble.draw(&[draws], draws.count, |batches| {
+            summary.add(&batches[0], max_attempts)?;
+            sink(batches[0])
+        })?;
         Ok(summary)
+    }
+}
+
+/// A recipe among several that are drawn together, step by step.
+#[derive(Clone, Copy)]
+pub(crate) struct Member<'a> {
+    pub(crate) recipe: &'a Recipe,
+    /// How many draws a step takes, at least 1.
+    pub(crate) per_step: u64,
+}
+
+/// An engine with the members of an ensemble.
+pub(crate) struct Ensemble<'a>(Way<'a>);
+
+enum Way<'a> {
+    Gpu(gpu::Drawer<'a>),
+    Cpu(cpu::Drawer<'a>),
+}
+
+impl Ensemble<'_> {
+    /// Makes the first `steps` steps of each member's draws, and hands them to `sink` window by window, a batch a
+    /// member. A window is one submission for all members. Nothing is said of draws that failed.
+    pub(crate) fn draw<E: From<EngineError>>(
+        &mut self,
+        draws: &[Draws],
+        steps: u64,
+        mut sink: impl FnMut(&[Batch]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match &mut self.0 {
+            _ if steps == 0 => Ok(()),
+            Way::Gpu(drawer) => drawer.draw(draws, steps, &mut sink),
+            Way::Cpu(drawer) => drawer.draw(draws, steps, &mut sink),
+        }
     }
 }
 
@@ -356,31 +393,52 @@ impl fmt::Display for Engine {
     }
 }
 
-/// How many draws the next window should have: grows or shrinks towards [`WINDOW_TIME`].
+/// How many steps the next window should have: grows or shrinks towards [`WINDOW_TIME`].
 struct Pace {
     next: u64,
     most: u64,
+    /// Windows have a multiple of this, so that none leaves half a thread idle and planes have no padding.
+    grain: u64,
 }
 
 impl Pace {
-    /// Windows of at most `most` draws. The first has about 10^5 candidates.
-    fn new(recipe: &Recipe, formats: &[Format], most: u64) -> Pace {
-        let bytes = formats.iter().map(|format| format.bytes(4)).max().expect("something comes out");
-        let most = most.min(4 * (WINDOW_BYTES / bytes)).max(4);
-        Pace { next: ((recipe.acceptance() * 1e5) as u64).clamp(4, most), most }
+    /// Windows of at most `most` steps of the members, whose `formats` come out. The first has about 10^5 candidates.
+    fn new<'a>(members: &[Member], formats: impl Iterator<Item = &'a [Format]>, most: u64) -> Pace {
+        let four_steps = |(member, formats): (&Member, &'a [Format])| {
+            formats.iter().map(|format| format.bytes(4 * member.per_step)).max()
+        };
+        let bytes = members.iter().zip(formats).filter_map(four_steps).max().expect("something comes out");
+        let candidates =
+            members.iter().map(|member| member.per_step as f64 / member.recipe.acceptance()).sum::<f64>();
+        let grain = if members.iter().all(|member| member.per_step == 1) { 4 } else { 1 };
+        let most = most.min(4 * WINDOW_BYTES / bytes).max(grain) / grain * grain;
+        Pace { next: ((1e5 / candidates) as u64).clamp(grain, most), most, grain }
     }
 
-    /// Learns from a window of `count` draws that took until now from `start`.
-    fn learn(&mut self, count: u64, start: Instant) {
+    /// Learns from a window of `steps` that took until now from `start`.
+    fn learn(&mut self, steps: u64, start: Instant) {
         let ratio = WINDOW_TIME.as_secs_f64() / start.elapsed().as_secs_f64().max(1e-6);
-        let wanted = count as f64 * ratio.clamp(0.25, 2.0);
-        // A multiple of 4, so that no window leaves half a thread idle and planes have no padding.
-        self.next = (wanted as u64).clamp(4, self.most) / 4 * 4;
+        let wanted = steps as f64 * ratio.clamp(0.25, 2.0);
+        self.next = (wanted as u64).clamp(self.grain, self.most) / self.grain * self.grain;
     }
 
-    /// The next window, of what is left from `offset` on.
-    fn window(&self, draws: Draws, offset: u64) -> Option<Draws> {
-        let left = draws.count - offset;
-        (left > 0).then(|| draws.part(offset, left.min(self.next)))
+    /// The steps of the next window, of what is left of `steps` from `offset` on.
+    fn window(&self, steps: u64, offset: u64) -> Option<Window> {
+        let left = steps - offset;
+        (left > 0).then(|| Window { offset, steps: left.min(self.next) })
+    }
+}
+
+/// Some steps of an ensemble.
+#[derive(Clone, Copy)]
+struct Window {
+    offset: u64,
+    steps: u64,
+}
+
+impl Window {
+    /// The part of a member's draws.
+    fn of(self, draws: Draws, per_step: u64) -> Draws {
+        draws.part(self.offset * per_step, self.steps * per_step)
     }
 }

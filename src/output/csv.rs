@@ -50,6 +50,18 @@ impl<W: Write> Encoder for Csv<W> {
 
 /// The headings of a field's columns.
 fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
+    if let Some((_, count)) = &field.outer {
+        let one =
+            Field { name: field.name.clone(), outer: None, width: field.width / count, ..field.clone() };
+        let inner = names(&one, wavelengths);
+        let heading = |i, inner: &String| match field.axis {
+            Some(_) => {
+                format!("{}_{i}_{}", field.name, inner.trim_start_matches(&format!("{}_", field.name)))
+            }
+            None => format!("{}_{i}", field.name),
+        };
+        return (0..*count).flat_map(|i| inner.iter().map(move |inner| heading(i, inner))).collect();
+    }
     match field.axis.as_deref() {
         Some("wavelength") => wavelengths.iter().map(f64::to_string).collect(),
         Some(_) => (1..=field.width).map(|i| format!("{}_{i}", field.name)).collect(),

@@ -7,7 +7,7 @@ use std::path::Path;
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, Hdf5Error, LibverBound};
 
 use super::Encoder;
-use super::schema::{Field, Schema};
+use super::schema::{Constant, Field, Schema};
 use crate::quantity::Element;
 
 /// About how many bytes a chunk has: what the library of most readers keeps in its cache.
@@ -24,9 +24,16 @@ impl Hdf5 {
         let tables = Tables::new(&file, schema).map_err(io_error)?;
         let begin = || {
             for (field, table) in schema.fields.iter().zip(&tables.tables) {
-                if let Some(axis) = &field.axis {
-                    text_attribute(&table.set, "axis", axis)?;
+                if let [_, axes @ ..] = field.axes("").as_slice()
+                    && !axes.is_empty()
+                {
+                    text_attribute(&table.set, "axis", &axes.join(", "))?;
                 }
+            }
+            for constant in &schema.constants {
+                let set = self::constant(&file, constant)?;
+                let axes: Vec<_> = constant.axes.iter().map(|(name, _)| name.as_str()).collect();
+                text_attribute(&set, "axis", &axes.join(", "))?;
             }
             let wavelengths =
                 file.new_dataset::<f64>().shape([schema.wavelengths.len()]).create("wavelength")?;
@@ -57,6 +64,23 @@ impl Encoder for Hdf5 {
 pub(super) fn create(path: &Path, userblock: u64) -> Result<H5File, Hdf5Error> {
     let options = H5File::options().libver(LibverBound::Earliest).track_times(false).no_locking();
     options.userblock(userblock).create(path)
+}
+
+/// Writes an array that all draws share.
+pub(super) fn constant(file: &H5File, constant: &Constant) -> Result<H5Dataset, Hdf5Error> {
+    let shape: Vec<usize> = constant.shape().iter().map(|&n| n as usize).collect();
+    let set = match constant.element {
+        Element::F32 => file.new_dataset::<f32>().shape(shape).create(&constant.name)?,
+        Element::F64 => file.new_dataset::<f64>().shape(shape).create(&constant.name)?,
+        Element::U32 => file.new_dataset::<u32>().shape(shape).create(&constant.name)?,
+        Element::F16 => unreachable!("what draws share is kept as it was drawn"),
+    };
+    match constant.element {
+        Element::F32 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f32>(&constant.bytes))?,
+        Element::F64 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f64>(&constant.bytes))?,
+        _ => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, u32>(&constant.bytes))?,
+    }
+    Ok(set)
 }
 
 /// The quantities of a file, filled chunk by chunk.

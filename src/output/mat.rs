@@ -33,7 +33,9 @@ impl Mat {
                 field.name = "X".to_owned();
             }
             // Every array of MATLAB's has two dimensions.
-            field.axis.get_or_insert_with(|| "value".to_owned());
+            if !field.is_list() {
+                field.axis = Some("value".to_owned());
+            }
         }
         let file = h5::create(path, USERBLOCK).map_err(io_error)?;
         let tables = h5::Tables::new(&file, &schema).map_err(io_error)?;
@@ -43,6 +45,14 @@ impl Mat {
                 if field.name == "X" {
                     file.root_group().link("data", "X")?;
                 }
+            }
+            for constant in &schema.constants {
+                let mut constant = constant.clone();
+                if constant.axes.len() == 1 {
+                    constant.axes.push(("value".to_owned(), 1));
+                }
+                let set = h5::constant(&file, &constant)?;
+                class(&set, matlab_class(constant.element))?;
             }
             let wavelengths = &schema.wavelengths;
             row(&file, "wavelength", wavelengths, &[1, wavelengths.len()])?;

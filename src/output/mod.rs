@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use crate::quantity::Element;
 
 pub use pending::{Existing, Pending, write_file};
-pub use schema::{Field, Schema};
+pub use schema::{Constant, Field, Schema};
 pub use set::{Audit, Layout, Outcome, Plan, SetWriter, Shard, Start, merge};
 pub use spd::{MOST_FILES, SpdFolder, SpdName};
 
@@ -125,9 +125,13 @@ impl Format {
             return Err(OutputError::NotBuilt { path, what, feature });
         }
         let one = schema.fields.len() == 1;
+        let shares = !schema.constants.is_empty();
         let halves = schema.fields.iter().any(|field| field.stored == Element::F16);
         let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
         match self {
+            Format::Npy | Format::Csv | Format::Parquet | Format::Spd if shares => {
+                cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
+            }
             Format::Npy if !one => {
                 cannot(".npy", "one array", "ask for one quantity, or name it .npz, .zarr, .h5 or .parquet")
             }
@@ -248,6 +252,8 @@ mod tests {
         let lrv = Field::scalar("lrv", Element::F32);
         let schema = |fields: &[&Field]| Schema {
             fields: fields.iter().copied().cloned().collect(),
+            row: "draw".to_owned(),
+            constants: Vec::new(),
             count: 1,
             wavelengths: vec![400.0; 31],
             attributes: serde_json::Map::new(),

@@ -42,6 +42,10 @@ impl<W: Write + Seek> Npz<W> {
         let wavelengths: Vec<u8> = schema.wavelengths.iter().flat_map(|w| w.to_le_bytes()).collect();
         let array = npy::file("<f8", &[schema.wavelengths.len() as u64], &wavelengths)?;
         npz.add("wavelengths", &array, 0)?;
+        for constant in &schema.constants {
+            let dtype = npy::type_string(constant.element);
+            npz.add(&constant.name, &npy::file(dtype, &constant.shape(), &constant.bytes)?, 0)?;
+        }
         let text: Vec<char> = schema.attributes_text().chars().collect();
         let utf32: Vec<u8> = text.iter().flat_map(|&c| u32::from(c).to_le_bytes()).collect();
         npz.add("attributes", &npy::file(&format!("<U{}", text.len()), &[], &utf32)?, 0)?;

@@ -129,9 +129,9 @@ fn write_values<T: DataType, const SIZE: usize>(
     for batch in bytes.chunks(BATCH_ROWS * field.stored_bytes()) {
         let (values, _) = batch.as_chunks();
         let values: Vec<T::T> = values.iter().copied().map(value).collect();
-        let (defined, continues) = match field.axis {
-            Some(_) => (Some(&defined[..values.len()]), Some(&continues[..values.len()])),
-            None => (None, None),
+        let (defined, continues) = match field.is_list() {
+            true => (Some(&defined[..values.len()]), Some(&continues[..values.len()])),
+            false => (None, None),
         };
         writer.typed::<T>().write_batch(&values, defined, continues)?;
     }
@@ -141,7 +141,7 @@ fn write_values<T: DataType, const SIZE: usize>(
 /// The schema as Parquet knows it.
 fn root(fields: &[Field]) -> TypePtr {
     let fields = fields.iter().map(|field| {
-        let name = if field.axis.is_some() { "element" } else { &field.name };
+        let name = if field.is_list() { "element" } else { &field.name };
         let (physical, logical) = match field.stored {
             Element::F32 => (Physical::FLOAT, None),
             Element::F64 => (Physical::DOUBLE, None),
@@ -152,12 +152,12 @@ fn root(fields: &[Field]) -> TypePtr {
             .with_repetition(Repetition::REQUIRED)
             .build();
         let value = Arc::new(value.expect("the type is Parquet's"));
-        match field.axis {
-            Some(_) => {
+        match field.is_list() {
+            true => {
                 let list = nested("list", Repetition::REPEATED, None, value);
                 nested(&field.name, Repetition::REQUIRED, Some(LogicalType::List), list)
             }
-            None => value,
+            false => value,
         }
     });
     let root = Type::group_type_builder("schema").with_fields(fields.collect()).build();
@@ -216,7 +216,7 @@ type Table = WIPOffset<flatbuffers::TableFinishedWIPOffset>;
 
 fn arrow_field(to: &mut FlatBufferBuilder, field: &Field) -> Table {
     const FIXED_SIZE_LIST: u8 = 16;
-    if field.axis.is_none() {
+    if !field.is_list() {
         return arrow_value(to, &field.name, field.stored);
     }
     let value = arrow_value(to, "element", field.stored);

@@ -3,7 +3,7 @@
 use std::io;
 
 use super::npy;
-use super::schema::Schema;
+use super::schema::{Constant, Schema};
 use super::set::Part;
 
 /// The `.npy` files of one chunk.
@@ -25,6 +25,15 @@ pub(super) fn npy_metadata(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
     let bytes: Vec<u8> = schema.wavelengths.iter().flat_map(|w| w.to_le_bytes()).collect();
     let bytes = npy::file("<f8", &[schema.wavelengths.len() as u64], &bytes)?;
     Ok(vec![Part { name: "wavelengths.npy".to_owned(), bytes: bytes.into() }])
+}
+
+/// The `.npy` files of what all draws share.
+pub(super) fn npy_constants(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
+    let part = |constant: &Constant| {
+        let bytes = npy::file(npy::type_string(constant.element), &constant.shape(), &constant.bytes)?;
+        Ok(Part { name: format!("{}.npy", constant.name), bytes: bytes.into() })
+    };
+    schema.constants.iter().map(part).collect()
 }
 
 /// The `.parquet` file of one chunk.

@@ -25,7 +25,10 @@ pub struct Field {
     pub name: String,
     /// What its values run over, such as `wavelength`; `None` where a draw has one value, and the array one dimension.
     pub axis: Option<String>,
-    /// How many values a draw has.
+    /// What a draw has several rows of such values of, and how many, such as the surfaces of a scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outer: Option<(String, usize)>,
+    /// How many values a draw has, in all its rows.
     pub width: usize,
     /// The type of the values as they are delivered.
     pub element: Element,
@@ -36,12 +39,17 @@ pub struct Field {
 impl Field {
     /// A quantity of `width` values a draw, over `axis`.
     pub fn vector(name: &str, axis: &str, width: usize, element: Element) -> Field {
-        Field { name: name.to_owned(), axis: Some(axis.to_owned()), width, element, stored: element }
+        Field { width, axis: Some(axis.to_owned()), ..Field::scalar(name, element) }
     }
 
     /// A quantity of one value a draw.
     pub fn scalar(name: &str, element: Element) -> Field {
-        Field { name: name.to_owned(), axis: None, width: 1, element, stored: element }
+        Field { name: name.to_owned(), axis: None, outer: None, width: 1, element, stored: element }
+    }
+
+    /// The same for `count` rows a draw.
+    pub fn repeated(self, outer: &str, count: usize) -> Field {
+        Field { width: self.width * count, outer: Some((outer.to_owned(), count)), ..self }
     }
 
     /// The same, written as another type of float where it is one.
@@ -64,10 +72,20 @@ impl Field {
 
     /// The shape of `rows` draws.
     pub fn shape(&self, rows: u64) -> Vec<u64> {
-        match self.axis {
-            Some(_) => vec![rows, self.width as u64],
-            None => vec![rows],
-        }
+        let outer = self.outer.as_ref().map(|(_, count)| *count);
+        let inner = self.axis.as_ref().map(|_| self.width / outer.unwrap_or(1).max(1));
+        std::iter::once(rows).chain(outer.into_iter().chain(inner).map(|n| n as u64)).collect()
+    }
+
+    /// The names of the dimensions, where a row is called `row`.
+    pub fn axes<'a>(&'a self, row: &'a str) -> Vec<&'a str> {
+        let outer = self.outer.as_ref().map(|(name, _)| name.as_str());
+        std::iter::once(row).chain(outer).chain(self.axis.as_deref()).collect()
+    }
+
+    /// Whether a draw has a list of values, rather than one.
+    pub(super) fn is_list(&self) -> bool {
+        self.axis.is_some() || self.outer.is_some()
     }
 
     /// Values as delivered, as they are to be written.
@@ -101,17 +119,55 @@ impl Field {
     }
 }
 
+/// An array that all draws share.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Constant {
+    /// Its name.
+    pub name: String,
+    /// Its dimensions: their names and extents.
+    pub axes: Vec<(String, u64)>,
+    /// The type of its values.
+    pub element: Element,
+    /// Its values in C order. A set of chunks has them in a file of their own.
+    #[serde(skip)]
+    pub bytes: Vec<u8>,
+}
+
+/// What is made from one description has the same values.
+impl PartialEq for Constant {
+    fn eq(&self, other: &Constant) -> bool {
+        (&self.name, &self.axes, self.element) == (&other.name, &other.axes, other.element)
+    }
+}
+
+impl Constant {
+    /// The extents of its dimensions.
+    pub(super) fn shape(&self) -> Vec<u64> {
+        self.axes.iter().map(|(_, extent)| *extent).collect()
+    }
+}
+
 /// What a data set holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Schema {
     /// Its quantities, in the order in which their columns are delivered.
     pub fields: Vec<Field>,
+    /// What a draw is called: `draw`, or `scene` where it is one.
+    #[serde(default = "draw")]
+    pub row: String,
+    /// Arrays that all draws share.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub constants: Vec<Constant>,
     /// How many draws there are.
     pub count: u64,
     /// The wavelengths that the axis `wavelength` stands for, nm.
     pub wavelengths: Vec<f64>,
     /// What the draws were made from, for files that can say so.
     pub attributes: Map<String, Value>,
+}
+
+fn draw() -> String {
+    "draw".to_owned()
 }
 
 impl Schema {

@@ -9,7 +9,7 @@ use std::io;
 
 use serde_json::{Map, Value, json};
 
-use super::schema::{Field, Schema};
+use super::schema::{Constant, Field, Schema};
 use super::set::Part;
 
 /// The level at which Zstandard packs chunks, where it does.
@@ -33,10 +33,8 @@ pub(super) fn chunk<'a>(
             if bytes.len() < size {
                 bytes.to_mut().resize(size, 0);
             }
-            let name = match field.axis {
-                Some(_) => format!("{}/c.{index}.0", field.name),
-                None => format!("{}/c.{index}", field.name),
-            };
+            let others = ".0".repeat(field.shape(0).len() - 1);
+            let name = format!("{}/c.{index}{others}", field.name);
             Ok(Part { name, bytes: pack(bytes, level)? })
         })
         .collect()
@@ -61,8 +59,14 @@ pub(super) fn metadata(schema: &Schema, level: Level, rows: u64) -> Vec<Part<'st
     let mut arrays: Map<String, Value> = schema
         .fields
         .iter()
-        .map(|field| (field.name.clone(), array(field, schema.count, rows, level)))
+        .map(|field| (field.name.clone(), array(field, &schema.row, (schema.count, rows), level)))
         .collect();
+    arrays.extend(schema.constants.iter().map(|constant| {
+        let codecs = [json!({ "name": "bytes", "configuration": { "endian": "little" } })];
+        let (shape, data_type) = (constant.shape(), constant.element.name());
+        let names: Vec<_> = constant.axes.iter().map(|(name, _)| name.as_str()).collect();
+        (constant.name.clone(), node(&shape, &shape, data_type, &codecs, &names, json!({})))
+    }));
     let mut parts = Vec::new();
     if !schema.wavelengths.is_empty() {
         arrays.insert("wavelength".to_owned(), wavelength(schema.wavelengths.len()));
@@ -82,13 +86,25 @@ pub(super) fn metadata(schema: &Schema, level: Level, rows: u64) -> Vec<Part<'st
     parts
 }
 
-fn array(field: &Field, count: u64, rows: u64, level: Level) -> Value {
+/// The chunks of what all draws share, one each.
+pub(super) fn constants(schema: &Schema) -> Vec<Part<'_>> {
+    let name = |constant: &'_ Constant| {
+        let others = ".0".repeat(constant.axes.len() - 1);
+        format!("{}/c.0{others}", constant.name)
+    };
+    schema
+        .constants
+        .iter()
+        .map(|constant| Part { name: name(constant), bytes: Cow::Borrowed(constant.bytes.as_slice()) })
+        .collect()
+}
+
+fn array(field: &Field, row: &str, (count, rows): (u64, u64), level: Level) -> Value {
     let mut codecs = vec![json!({ "name": "bytes", "configuration": { "endian": "little" } })];
     if let Some(level) = level {
         codecs.push(json!({ "name": "zstd", "configuration": { "level": level, "checksum": false } }));
     }
-    let names: Vec<_> = std::iter::once("draw").chain(field.axis.as_deref()).collect();
-    node(&field.shape(count), &field.shape(rows), field.stored.name(), &codecs, &names, json!({}))
+    node(&field.shape(count), &field.shape(rows), field.stored.name(), &codecs, &field.axes(row), json!({}))
 }
 
 fn wavelength(count: usize) -> Value {

@@ -82,12 +82,22 @@ impl Layout {
         }
     }
 
+    /// The files of what all draws share.
+    fn constants(self, plan: &Plan) -> io::Result<Vec<Part<'_>>> {
+        match self {
+            Layout::Zarr { .. } => Ok(zarr::constants(&plan.schema)),
+            Layout::Npy => parts::npy_constants(&plan.schema),
+            Layout::Parquet => Ok(Vec::new()), // see Layout::check
+        }
+    }
+
     /// The folders in a set.
     fn folders(self, plan: &Plan) -> Vec<String> {
         match self {
             Layout::Zarr { .. } => {
                 let names = plan.schema.fields.iter().map(|field| field.name.clone());
-                names.chain(["wavelength".to_owned()]).collect()
+                let constants = plan.schema.constants.iter().map(|constant| constant.name.clone());
+                names.chain(constants).chain(["wavelength".to_owned()]).collect()
             }
             Layout::Npy | Layout::Parquet => Vec::new(),
         }
@@ -193,6 +203,10 @@ impl SetWriter {
         if writer.root != writer.path {
             for folder in writer.plan.layout.folders(&writer.plan) {
                 fs::create_dir_all(writer.root.join(folder)).map_err(failed)?;
+            }
+            let constants = writer.plan.layout.constants(&writer.plan).map_err(failed)?;
+            for part in constants {
+                place(&writer.root.join(part.name), &part.bytes).map_err(failed)?;
             }
             for (name, text) in companions {
                 place(&writer.root.join(name), text.as_bytes()).map_err(failed)?;

@@ -1,0 +1,267 @@
+//! What is drawn for a group, and where: a [`Group`] that was found to be possible.
+
+use serde::Serialize;
+
+use crate::dataset::Kind;
+use crate::grid::Grid;
+use crate::level::{self, Level};
+use crate::model::{Model, Parts};
+use crate::recipe::{Intensity, Recipe, RecipeBuilder, RecipeError};
+use crate::stream::Stream;
+
+use super::aim::{Aimed, key};
+use super::error::{Fault, Problem};
+use super::group::{Aim, Base, Group, Illuminants, Levels, Sharing, Targets};
+
+/// A group as it is drawn.
+pub(super) struct Cast {
+    pub(super) name: String,
+    pub(super) role: Role,
+    /// How many a scene has.
+    pub(super) count: u32,
+    /// In rows of that.
+    pub(super) stream: Stream,
+    pub(super) max_attempts: u32,
+    pub(super) shapes: Shapes,
+    pub(super) intensity: Option<Varying>,
+    pub(super) arrays: Vec<Array>,
+}
+
+/// What the spectra of a group are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Lights.
+    Illuminant,
+    /// Reflectances.
+    Surface,
+    /// Reflectances that have something given.
+    Target,
+}
+
+/// Where the spectra of a group come from, before intensities.
+pub(super) enum Shapes {
+    /// From the engine, for each scene.
+    Engine(Box<Drawing>),
+    /// From the CPU, once for all scenes: for so few no shader is worth compiling.
+    Once(Box<Drawing>),
+    /// From the CPU, for each scene.
+    Aimed(Box<Aimed>),
+}
+
+/// Draws of a recipe: `places` a scene, one for each of its elements or one for all.
+pub(super) struct Drawing {
+    pub(super) recipe: Recipe,
+    pub(super) places: u32,
+}
+
+/// An intensity that varies.
+pub(super) struct Varying {
+    level: Level<f32>,
+    pub(super) sharing: Sharing,
+}
+
+/// An array that a scene gives.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Array {
+    /// Its name: that of its group, with an underscore and the name of the quantity unless that is spectra.
+    pub name: String,
+    /// What it holds.
+    pub content: Content,
+    /// Whether it has an entry for each scene, rather than one for all.
+    pub per_scene: bool,
+    /// The extents of an entry. Spectra have (count, bands), and other quantities one of them or none.
+    pub shape: Vec<usize>,
+}
+
+/// What an array holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Content {
+    /// Power or reflectance, f32.
+    Spectra,
+    /// What lights were multiplied by, f32.
+    Intensity,
+    /// Luminous reflectance values, f32.
+    Lrv,
+    /// The tristimulus values that targets were given, f32.
+    Xyz,
+    /// How many candidates were drawn, u32.
+    Attempts,
+}
+
+impl Content {
+    /// What the name of such an array adds to that of its group.
+    pub fn suffix(self) -> &'static str {
+        match self {
+            Content::Spectra => "",
+            Content::Intensity => "_intensity",
+            Content::Lrv => "_lrv",
+            Content::Xyz => "_xyz",
+            Content::Attempts => "_attempts",
+        }
+    }
+
+    /// What the last of the extents counts.
+    pub fn axis(self) -> Option<&'static str> {
+        match self {
+            Content::Spectra => Some("wavelength"),
+            Content::Xyz => Some("axis"),
+            _ => None,
+        }
+    }
+}
+
+impl Array {
+    /// How many values an entry has.
+    pub fn values(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// How many bytes an entry has: every value has 4.
+    pub fn bytes(&self) -> usize {
+        4 * self.values()
+    }
+}
+
+impl Varying {
+    /// The intensity of an element of a scene; `stream` is in rows of as many as the scene has.
+    pub(super) fn at(&self, stream: Stream, scene: u64, element: u32) -> f32 {
+        // The first place of a row is the same in rows of any length.
+        let (stream, index) = match self.sharing {
+            Sharing::Scene => (stream.in_rows(1), scene),
+            Sharing::Each => (stream, scene * u64::from(stream.row()) + u64::from(element)),
+        };
+        self.level.of(stream.block(index, 0, level::BLOCK)[0])
+    }
+}
+
+impl Cast {
+    /// Finds out how to draw group `number` of a scene.
+    pub(super) fn new(number: usize, group: &Group, grid: Grid, seed: u64) -> Result<Cast, Fault> {
+        let base = group.base();
+        let fault = |key, problem| Fault::of_group(number, key, problem);
+        let count = u32::try_from(base.count).expect("the count was checked");
+        let stream = Stream::named(seed, &base.name).in_rows(count);
+        if let Some(model) = &base.model
+            && model.grid() != grid
+        {
+            return Err(fault("model", Problem::Grid { model: model.grid(), scene: grid }));
+        }
+        let (role, shapes, intensity) = match group {
+            Group::Illuminants(group) => {
+                let (drawing, intensity) = illuminants(group).map_err(|(k, p)| fault(k, p))?;
+                let shapes = if group.fixed { Shapes::Once(drawing) } else { Shapes::Engine(drawing) };
+                (Role::Illuminant, shapes, intensity)
+            }
+            Group::Surfaces(group) => {
+                let model = of_kind(base, Kind::Reflectance).map_err(|(k, p)| fault(k, p))?;
+                let recipe = recipe(base, model).build().map_err(|e| fault(key(&e), Problem::Recipe(e)))?;
+                let drawing = Box::new(Drawing { recipe, places: count });
+                let shapes = if group.fixed { Shapes::Once(drawing) } else { Shapes::Engine(drawing) };
+                (Role::Surface, shapes, None)
+            }
+            Group::Targets(group) => {
+                let aimed = Aimed::new(group, grid.len(), stream).map_err(|(k, p)| fault(k, p))?;
+                (Role::Target, Shapes::Aimed(Box::new(aimed)), None)
+            }
+        };
+        let arrays = arrays(group, &shapes, intensity.as_ref(), grid.len());
+        let (name, max_attempts) = (base.name.clone(), base.max_attempts);
+        Ok(Cast { name, role, count, stream, max_attempts, shapes, intensity, arrays })
+    }
+
+    /// What the engine draws, where it does.
+    pub(super) fn drawn_by_engine(&self) -> Option<&Drawing> {
+        match &self.shapes {
+            Shapes::Engine(drawing) => Some(drawing),
+            _ => None,
+        }
+    }
+}
+
+fn recipe(base: &Base, model: &Model) -> RecipeBuilder {
+    Recipe::new(model).covariance_scale(base.covariance_scale).max_attempts(base.max_attempts)
+}
+
+fn of_kind(base: &Base, wanted: Kind) -> Result<&Model, (&'static str, Problem)> {
+    let model = base.model.as_ref().expect("only flat targets have none");
+    match model.kind() {
+        found if found == wanted => Ok(model),
+        found => Err(("model", Problem::Kind { found, wanted })),
+    }
+}
+
+type Lights = (Box<Drawing>, Option<Varying>);
+
+fn illuminants(group: &Illuminants) -> Result<Lights, (&'static str, Problem)> {
+    let model = of_kind(&group.base, Kind::Illuminant)?;
+    let model = match &group.mean {
+        Some(mean) => with_mean(model, mean).map_err(|problem| ("mean", problem))?,
+        None => model.clone(),
+    };
+    let failed = |e: RecipeError| (key(&e), Problem::Recipe(e));
+    let mut recipe = recipe(&group.base, &model);
+    let mut varying = None;
+    match group.intensity {
+        None => {}
+        // The same for all: the recipe has it for nothing.
+        Some((intensity @ Intensity::Fixed(_), _)) => recipe = recipe.intensity(intensity),
+        Some((intensity, sharing)) => {
+            let checked = recipe.clone().intensity(intensity).build().map_err(failed)?;
+            let level = checked.program().level.as_ref().expect("the intensity varies");
+            varying = Some(Varying { level: Level::new(level), sharing });
+        }
+    }
+    let places = if group.same_shape { 1 } else { group.base.count as u32 };
+    let recipe = recipe.build().map_err(failed)?;
+    Ok((Box::new(Drawing { recipe, places }), varying))
+}
+
+/// The model with another mean spectrum, of the same mean power.
+fn with_mean(model: &Model, mean: &[f64]) -> Result<Model, Problem> {
+    let parts = model.parts();
+    if mean.len() != model.bands() {
+        return Err(Problem::MeanLength { found: mean.len(), expected: model.bands() });
+    }
+    let power = mean.iter().sum::<f64>() / mean.len() as f64;
+    if !(power > 0.0 && power.is_finite()) {
+        return Err(Problem::DarkMean(power));
+    }
+    // The mean of the draws is that of the model and what the mean weights add to it.
+    let old = model.reconstruct(parts.weight_mean.as_slice());
+    let scale = old.mean() / power;
+    let mut new = parts.mean.clone();
+    new.iter_mut().zip(mean).zip(&old).for_each(|((new, mean), old)| *new += scale * mean - old);
+    Model::new(Parts { mean: new, ..parts.clone() }).map_err(Problem::Model)
+}
+
+fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: usize) -> Vec<Array> {
+    let base = group.base();
+    let count = base.count as usize;
+    let once = matches!(shapes, Shapes::Once(_));
+    let array = |content: Content, per_scene, shape: &[usize]| Array {
+        name: format!("{}{}", base.name, content.suffix()),
+        content,
+        per_scene,
+        shape: shape.to_vec(),
+    };
+    let mut arrays = vec![array(Content::Spectra, !once || intensity.is_some(), &[count, bands])];
+    match intensity.map(|intensity| intensity.sharing) {
+        Some(Sharing::Scene) => arrays.push(array(Content::Intensity, true, &[])),
+        Some(Sharing::Each) => arrays.push(array(Content::Intensity, true, &[count])),
+        None => {}
+    }
+    let mut flat = false;
+    if let Group::Targets(Targets { aim, .. }) = group {
+        arrays.push(array(Content::Lrv, true, &[count]));
+        if let Aim::Hue(_) = aim {
+            arrays.push(array(Content::Xyz, true, &[count, 3]));
+        }
+        flat = matches!(aim, Aim::Flat(Levels::Each(_) | Levels::Uniform(..)));
+    }
+    if !flat {
+        arrays.push(array(Content::Attempts, !once, &[count]));
+    }
+    arrays
+}

@@ -1,0 +1,186 @@
+//! What can be wrong with a scene: what, where, and what to do.
+
+use std::fmt;
+
+use crate::dataset::{DatasetError, Kind};
+use crate::grid::{Grid, GridError};
+use crate::model::ModelError;
+use crate::recipe::RecipeError;
+
+/// Why a scene is none.
+#[derive(Debug, thiserror::Error)]
+#[error("{place}: {problem}")]
+pub struct SceneError {
+    place: Place,
+    problem: Problem,
+}
+
+/// Where something is wrong.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The file, where there is one.
+    pub file: Option<String>,
+    /// The line in it, from 1.
+    pub line: Option<usize>,
+    /// The group.
+    pub group: Option<String>,
+    /// The key, as scene files have it; none where no key is to blame.
+    pub key: String,
+}
+
+/// What is wrong. The messages say what to do about it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what the fields are
+pub enum Problem {
+    #[error("cannot read it: {0}")]
+    Read(std::io::Error),
+    #[error("this is not TOML: {0}")]
+    Syntax(String),
+    #[error("there is no such key{}; there are {known}", meant(suggestion))]
+    UnknownKey { suggestion: Option<String>, known: String },
+    #[error("it is missing: write {example}")]
+    Missing { example: &'static str },
+    #[error("this is {found}, and it takes {expected}")]
+    Type { expected: &'static str, found: String },
+    #[error("there is no {found:?}{}; there are {known}", meant(suggestion))]
+    Choice { found: String, suggestion: Option<String>, known: String },
+    #[error("{with:?} says the same in another way: keep one of the two")]
+    Both { with: &'static str },
+    #[error("it means nothing {with}: leave it out")]
+    Pointless { with: &'static str },
+    #[error("a scene needs something to draw: add an [[illuminant]], a [[surface]] or a [[target]]")]
+    NoGroups,
+    #[error("{0} scenes: it takes 1 to 4294967296")]
+    Scenes(u64),
+    #[error("{0:?} is no name for a group: use letters, digits, - and _, a letter first")]
+    Name(String),
+    #[error("two groups are called {0:?}: rename one, for its draws depend on its name")]
+    SameName(String),
+    #[error("the arrays of {0:?} and of this group would have one name: rename one of them")]
+    SameArray(String),
+    #[error("{0:?} happens to give the same random numbers: rename one of the two")]
+    SameStream(String),
+    #[error("{0} a scene: it takes 1 to {MAX_COUNT}; what needs more can be several groups")]
+    Count(u64),
+    #[error("{draws:.2e} draws in all: at most {MAX_DRAWS:.0e} fit into one data set, so draw fewer scenes")]
+    Draws { draws: f64 },
+    #[error("{name:?} is neither a file nor a built-in model ({}){}", builtin(), meant(suggestion))]
+    NoModel { name: String, suggestion: Option<String> },
+    #[error(transparent)]
+    Model(ModelError),
+    #[error("this model is of {found}s, and the group is of {wanted}s: choose another model")]
+    Kind { found: Kind, wanted: Kind },
+    #[error("the model is on {model} nm, and the scene on {scene} nm: {}", same_grid(*model))]
+    Grid { model: Grid, scene: Grid },
+    #[error(transparent)]
+    Wavelengths(GridError),
+    #[error("{0}; name a built-in one (d65, flat), or a table of one spectrum")]
+    Mean(DatasetError),
+    #[error("{found} spectra, and a mean is one: leave the others out of the table")]
+    Means { found: usize },
+    #[error("{found} values where the model has {expected} bands: give one a band")]
+    MeanLength { found: usize, expected: usize },
+    #[error("its mean power is {0}, and must be above 0: give the spectrum of a light")]
+    DarkMean(f64),
+    #[error("{0}: every level must be above 0 and below 1, where 1 is a perfect white")]
+    Level(f64),
+    #[error("{0} levels: it takes 1 to 10000")]
+    Levels(u64),
+    #[error("from {from} to {to}: the first must be below the second")]
+    Order { from: f64, to: f64 },
+    #[error("{from} to {to}: {what} is between 0 and 1, and the first no more than the second")]
+    Share { what: &'static str, from: f64, to: f64 },
+    #[error(
+        "copies are scaled to levels, and there are none: write lrv as a list or as {{ from, to, levels }}"
+    )]
+    NoLevels,
+    #[error("hue {hue}, saturation {saturation}, lightness {lightness}: {source}; narrow the ranges")]
+    Hue { hue: f64, saturation: f64, lightness: f64, source: RecipeError },
+    #[error("{0}")]
+    Recipe(#[from] RecipeError),
+}
+
+/// The most draws of a group in one scene: what a window of draws has room for.
+pub(super) const MAX_COUNT: u64 = 10_000_000;
+
+/// The most draws of one scene file: more is a slip of the pen, of 12 TB at 31 bands.
+pub(super) const MAX_DRAWS: f64 = 1e11;
+
+/// A problem, and whose it is.
+#[derive(Debug)]
+pub(super) struct Fault {
+    /// The number of the group.
+    pub(super) group: Option<usize>,
+    pub(super) key: &'static str,
+    pub(super) problem: Problem,
+}
+
+impl Fault {
+    /// A problem of the scene as a whole.
+    pub(super) fn of_scene(key: &'static str, problem: Problem) -> Fault {
+        Fault { group: None, key, problem }
+    }
+
+    /// A problem of a group.
+    pub(super) fn of_group(group: usize, key: &'static str, problem: Problem) -> Fault {
+        Fault { group: Some(group), key, problem }
+    }
+}
+
+impl SceneError {
+    pub(super) fn new(place: Place, problem: Problem) -> SceneError {
+        SceneError { place, problem }
+    }
+
+    /// Where something is wrong.
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+
+    /// What is wrong there.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if let Some(file) = &self.file {
+            write!(f, "{file}")?;
+            if let Some(line) = self.line {
+                write!(f, ", line {line}")?;
+            }
+        }
+        let separator = if self.file.is_some() { ", " } else { "" };
+        match (self.key.as_str(), &self.group) {
+            ("", None) if self.file.is_none() => write!(f, "the scene"),
+            ("", None) => Ok(()),
+            ("", Some(group)) => write!(f, "{separator}group {group:?}"),
+            (key, None) => write!(f, "{separator}{key}"),
+            (key, Some(group)) => write!(f, "{separator}{key} of {group:?}"),
+        }
+    }
+}
+
+fn meant(suggestion: &Option<String>) -> String {
+    suggestion.as_ref().map_or_else(String::new, |suggestion| format!(", did you mean {suggestion:?}?"))
+}
+
+fn builtin() -> String {
+    crate::model::Model::BUILTIN.join(", ")
+}
+
+fn same_grid(model: Grid) -> String {
+    format!(
+        "set wavelengths = \"{model}\", or name a model on the scene's (some built-in ones end in -5nm; \
+         `spectroll fit --wavelengths` makes others)"
+    )
+}
+
+/// The one of `known` that was probably meant.
+pub(super) fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    let distance = |name: &&str| strsim::osa_distance(&found.to_ascii_lowercase(), name);
+    let close = known.into_iter().filter(|name| distance(name) <= 1 + name.len() / 4);
+    close.min_by_key(distance).map(str::to_owned)
+}

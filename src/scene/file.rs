@@ -1,0 +1,327 @@
+//! Scene files.
+
+use std::collections::HashMap;
+use std::fs;
+use std::ops::Range;
+use std::path::Path;
+
+use toml::de::DeTable;
+
+use crate::colorimetry;
+use crate::dataset::{Dataset, DatasetError, Table};
+use crate::grid::Extend;
+use crate::model::Model;
+use crate::program::Bounds;
+use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
+
+use super::error::{Place, Problem, SceneError, closest};
+use super::group::{Aim, Base, Copies, Group, Hue, Illuminants, Levels, Sharing, Surfaces, Targets};
+use super::reader::{Entry, Section, Wrong};
+use super::{Scene, SceneBuilder};
+
+/// The scene files that are built in, by name: the conditions of Singh et al. (2018).
+pub const PRESETS: [(&str, &str); 3] = [
+    ("condition1", include_str!("presets/condition1.toml")),
+    ("condition2", include_str!("presets/condition2.toml")),
+    ("condition3", include_str!("presets/condition3.toml")),
+];
+
+const SCENE: [&str; 6] = ["scenes", "seed", "wavelengths", "illuminant", "surface", "target"];
+const ILLUMINANT: [&str; 9] =
+    ["name", "model", "count", "intensity", "mean", "cov_scale", "same_shape", "fixed", "max_attempts"];
+const SURFACE: [&str; 6] = ["name", "model", "count", "cov_scale", "fixed", "max_attempts"];
+const TARGET: [&str; 11] =
+    ["name", "model", "count", "lrv", "xyz", "hue", "flat", "bounds", "copies", "cov_scale", "max_attempts"];
+
+impl Scene {
+    /// Reads a scene file. Models and spectra that it names are sought in its folder.
+    pub fn open(path: &Path) -> Result<Scene, SceneError> {
+        let name = path.display().to_string();
+        let text = fs::read_to_string(path).map_err(|e| {
+            let place = Place { file: Some(name.clone()), ..Place::default() };
+            SceneError::new(place, Problem::Read(e))
+        })?;
+        Scene::parse(&name, &text, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// Reads the text of a scene file; `name` is what messages call it.
+    ///
+    /// ```
+    /// use std::path::Path;
+    ///
+    /// use spectroll::scene::Scene;
+    ///
+    /// let text = "scenes = 10\n[[surface]]\nname = \"wall\"\nmodel = \"munsell-vrhel\"\ncuont = 5";
+    /// let error = Scene::parse("wall.toml", text, Path::new("")).err().unwrap().to_string();
+    /// assert!(error.starts_with(r#"wall.toml, line 5, cuont of "wall": there is no such key, did you mean "count"?"#));
+    /// ```
+    pub fn parse(name: &str, text: &str, folder: &Path) -> Result<Scene, SceneError> {
+        let error = |span: Option<Range<usize>>, group: Option<String>, key: String, problem| {
+            let line = span.map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+            SceneError::new(Place { file: Some(name.to_owned()), line, group, key }, problem)
+        };
+        let table = DeTable::parse(text).map_err(|e| {
+            error(e.span(), None, String::new(), Problem::Syntax(e.message().replace('\n', "; ")))
+        })?;
+        let file = Reader { folder, models: HashMap::new() }
+            .scene(table.get_ref())
+            .map_err(|wrong| error(Some(wrong.span), wrong.group, wrong.key, wrong.problem))?;
+        file.builder.checked().map_err(|fault| {
+            let spans = fault.group.map_or(&file.spans, |group| &file.groups[group].spans);
+            let own = spans.iter().find(|(key, _)| *key == fault.key).map(|(_, span)| span.clone());
+            let header = fault.group.map(|group| file.groups[group].header.clone());
+            let group = fault.group.map(|group| file.builder.groups[group].base().name.clone());
+            error(own.or(header), group, fault.key.to_owned(), fault.problem)
+        })
+    }
+
+    /// A built-in scene (see [`PRESETS`]).
+    pub fn preset(name: &str) -> Option<Scene> {
+        let (name, text) = PRESETS.iter().find(|(preset, _)| *preset == name)?;
+        Some(Scene::parse(name, text, Path::new("")).expect("they are possible"))
+    }
+}
+
+/// Where the keys of a table are.
+type Spans = Vec<(String, Range<usize>)>;
+
+/// What a file says.
+struct File {
+    builder: SceneBuilder,
+    spans: Spans,
+    groups: Vec<Located>,
+}
+
+/// Where a group is.
+struct Located {
+    header: Range<usize>,
+    spans: Spans,
+}
+
+struct Reader<'a> {
+    folder: &'a Path,
+    /// Those that were read.
+    models: HashMap<String, Model>,
+}
+
+impl Reader<'_> {
+    fn scene(&mut self, table: &DeTable) -> Result<File, Wrong> {
+        let section = Section::new(table, 0..0, "", &SCENE)?;
+        let mut builder = Scene::new(section.need("scenes", "scenes = 1000")?.whole()?);
+        if let Some(entry) = section.get("seed") {
+            builder = builder.seed(entry.whole()?);
+        }
+        if let Some(entry) = section.get("wavelengths") {
+            let grid = entry.text()?.parse().map_err(|e| entry.wrong(Problem::Wavelengths(e)))?;
+            builder = builder.wavelengths(grid);
+        }
+        let mut groups = Vec::new();
+        for (key, known) in [("illuminant", &ILLUMINANT[..]), ("surface", &SURFACE), ("target", &TARGET)] {
+            let Some(entry) = section.get(key) else { continue };
+            for (table, header) in entry.tables()? {
+                let section = Section::new(table, header.clone(), "", known)?;
+                let group = match key {
+                    "illuminant" => self.illuminants(&section)?.into(),
+                    "surface" => self.surfaces(&section)?.into(),
+                    _ => Group::from(self.targets(&section)?),
+                };
+                groups.push((Located { header, spans: spans(&section) }, group));
+            }
+        }
+        groups.sort_by_key(|(located, _)| located.header.start);
+        let (groups, made): (Vec<_>, Vec<_>) = groups.into_iter().unzip();
+        builder.groups = made;
+        Ok(File { builder, spans: spans(&section), groups })
+    }
+
+    fn illuminants(&mut self, section: &Section) -> Result<Illuminants, Wrong> {
+        let base = self.base(section, None)?;
+        let intensity = section.get("intensity").map(|entry| intensity(&entry)).transpose()?;
+        let model = base.model.as_ref().expect("it is needed");
+        let mean = section.get("mean").map(|entry| self.mean(&entry, model)).transpose()?;
+        let (fixed, same_shape) = (flag(section, "fixed")?, flag(section, "same_shape")?);
+        Ok(Illuminants { fixed, intensity, mean, same_shape, base })
+    }
+
+    fn surfaces(&mut self, section: &Section) -> Result<Surfaces, Wrong> {
+        Ok(Surfaces { base: self.base(section, None)?, fixed: flag(section, "fixed")? })
+    }
+
+    fn targets(&mut self, section: &Section) -> Result<Targets, Wrong> {
+        let flat = flag(section, "flat")?;
+        let given: Vec<_> =
+            ["lrv", "xyz", "hue"].into_iter().filter_map(|key| Some((key, section.get(key)?))).collect();
+        if let [(first, _), (_, second), ..] = given.as_slice() {
+            return Err(second.wrong(Problem::Both { with: first }));
+        }
+        let aim = match (given.first(), flat) {
+            (None, true) => Aim::Flat(Levels::Uniform(0.0, 1.0)),
+            (Some(("lrv", entry)), true) => Aim::Flat(levels(entry)?),
+            (Some(("lrv", entry)), false) => Aim::Lrv(levels(entry)?),
+            (Some((_, entry)), true) => return Err(entry.wrong(Problem::Both { with: "flat" })),
+            (Some(("xyz", entry)), _) => Aim::Xyz(entry.numbers("three numbers, as in [0.3, 0.3, 0.3]")?),
+            (Some((_, entry)), _) => Aim::Hue(hue(entry)?),
+            (None, false) => {
+                let example = "lrv = 0.4, lrv = { from = 0.2, to = 0.6, levels = 10 }, xyz, hue or flat = true; \
+                               reflectances with nothing given are a [[surface]]";
+                return Err(section.wrong("lrv", Problem::Missing { example }));
+            }
+        };
+        let base = self.base(section, Some((1, flat)))?;
+        let bounds = section.get("bounds");
+        if let Some(entry) = bounds.as_ref().filter(|_| !matches!(aim, Aim::Lrv(_))) {
+            let with = "without an lrv: a spectrum of given tristimulus values is not scaled";
+            return Err(entry.wrong(Problem::Pointless { with }));
+        }
+        let names = [("base", Bounds::Base), ("scaled", Bounds::Scaled), ("both", Bounds::Both)];
+        let bounds = bounds.map_or(Ok(Bounds::default()), |entry| entry.choice(&names))?;
+        let names = [
+            ("independent", Copies::Independent),
+            ("scaled", Copies::Scaled),
+            ("same_shape", Copies::SameShape),
+        ];
+        let copies = section.get("copies").map_or(Ok(Copies::default()), |entry| entry.choice(&names))?;
+        Ok(Targets { base, aim, bounds, copies })
+    }
+
+    /// What all groups have. Targets have a count unless one is said, and flat ones need no model.
+    fn base(&mut self, section: &Section, target: Option<(u64, bool)>) -> Result<Base, Wrong> {
+        let name = section.need("name", "name = \"background\"")?.text()?;
+        let model = match (section.get("model"), target) {
+            (None, Some((_, true))) => None,
+            (Some(entry), _) => Some(self.model(&entry)?),
+            (None, _) => Some(self.model(&section.need("model", "model = \"munsell-vrhel\"")?)?),
+        };
+        let count = match (section.get("count"), target) {
+            (None, Some((count, _))) => count,
+            _ => section.need("count", "count = 3, for as many in each scene")?.whole()?,
+        };
+        let covariance_scale = section.get("cov_scale").map_or(Ok(1.0), |entry| entry.number())?;
+        let max_attempts = match section.get("max_attempts") {
+            None => DEFAULT_MAX_ATTEMPTS,
+            Some(entry) => u32::try_from(entry.whole()?).unwrap_or(u32::MAX), // which is refused
+        };
+        Ok(Base { name: name.to_owned(), model, count, covariance_scale, max_attempts })
+    }
+
+    fn model(&mut self, entry: &Entry) -> Result<Model, Wrong> {
+        let name = entry.text()?;
+        if let Some(model) = self.models.get(name) {
+            return Ok(model.clone());
+        }
+        let path = self.folder.join(name);
+        let model = if Model::BUILTIN.contains(&name) {
+            Model::builtin(name)
+        } else if path.is_file() {
+            Model::load(&path)
+        } else {
+            let suggestion = closest(name, Model::BUILTIN);
+            return Err(entry.wrong(Problem::NoModel { name: name.to_owned(), suggestion }));
+        };
+        let model = model.map_err(|e| entry.wrong(Problem::Model(e)))?;
+        self.models.insert(name.to_owned(), model.clone());
+        Ok(model)
+    }
+
+    /// A mean spectrum on the grid of a model.
+    fn mean(&self, entry: &Entry, model: &Model) -> Result<Vec<f64>, Wrong> {
+        let grid = model.grid();
+        let table = match entry.text()? {
+            "d65" => return Ok(colorimetry::d65(grid)),
+            "flat" => return Ok(vec![1.0; grid.len()]),
+            path => Table::open(&self.folder.join(path), None),
+        };
+        let wrong = |e: DatasetError| entry.wrong(Problem::Mean(e));
+        let data = Dataset::new(&[table.map_err(wrong)?], grid, Extend::Error).map_err(wrong)?;
+        match data.spectra().ncols() {
+            1 => Ok(data.spectra().column(0).iter().copied().collect()),
+            found => Err(entry.wrong(Problem::Means { found })),
+        }
+    }
+}
+
+fn spans(section: &Section) -> Spans {
+    section.spans().map(|(key, span)| (key.to_owned(), span)).collect()
+}
+
+fn flag(section: &Section, key: &str) -> Result<bool, Wrong> {
+    section.get(key).map_or(Ok(false), |entry| entry.flag())
+}
+
+/// Two numbers, the first the smaller.
+fn range(entry: &Entry) -> Result<(f64, f64), Wrong> {
+    let [from, to] = entry.numbers("two numbers, as in [0.2, 0.6]")?;
+    Ok((from, to))
+}
+
+fn intensity(entry: &Entry) -> Result<(Intensity, Sharing), Wrong> {
+    let Some(section) = entry.section(&["log_uniform", "from_data", "shared"]).transpose()? else {
+        return match entry.number() {
+            Ok(number) => Ok((Intensity::Fixed(number), Sharing::Scene)),
+            Err(Wrong { problem: Problem::Type { found, .. }, .. }) => {
+                let expected = "a number, { log_uniform = [0.15, 150] } or { from_data = true }";
+                Err(entry.wrong(Problem::Type { expected, found }))
+            }
+            Err(other) => Err(other),
+        };
+    };
+    let sharing = if flag(&section, "shared")? { Sharing::Scene } else { Sharing::Each };
+    match (section.get("log_uniform"), section.get("from_data")) {
+        (Some(_), Some(data)) => Err(data.wrong(Problem::Both { with: "log_uniform" })),
+        (Some(entry), None) => {
+            let (low, high) = range(&entry)?;
+            Ok((Intensity::LogUniform(low, high), sharing))
+        }
+        (None, Some(entry)) if entry.flag()? => Ok((Intensity::Data, sharing)),
+        _ => Err(section.wrong(
+            "",
+            Problem::Missing { example: "intensity = { log_uniform = [0.15, 150] } or { from_data = true }" },
+        )),
+    }
+}
+
+fn levels(entry: &Entry) -> Result<Levels, Wrong> {
+    if let Some(list) = entry.list().transpose()? {
+        return Ok(Levels::Each(list));
+    }
+    let Some(section) = entry.section(&["from", "to", "levels", "uniform"]).transpose()? else {
+        return match entry.number() {
+            Ok(level) => Ok(Levels::from(level)),
+            Err(Wrong { problem: Problem::Type { found, .. }, .. }) => {
+                let expected =
+                    "a number, a list, { from = 0.2, to = 0.6, levels = 10 } or { uniform = [0.2, 0.6] }";
+                Err(entry.wrong(Problem::Type { expected, found }))
+            }
+            Err(other) => Err(other),
+        };
+    };
+    if let Some(uniform) = section.get("uniform") {
+        if let Some(other) = ["from", "to", "levels"].into_iter().find_map(|key| section.get(key)) {
+            return Err(other.wrong(Problem::Both { with: "uniform" }));
+        }
+        let (from, to) = range(&uniform)?;
+        return Ok(Levels::Uniform(from, to));
+    }
+    let from = section.need("from", "{ from = 0.2, to = 0.6, levels = 10 }")?.number()?;
+    let to = section.need("to", "{ from = 0.2, to = 0.6, levels = 10 }")?.number()?;
+    let count = section.need("levels", "{ from = 0.2, to = 0.6, levels = 10 }")?;
+    let levels = count.whole()?;
+    if !(1..=10_000).contains(&levels) {
+        return Err(count.wrong(Problem::Levels(levels)));
+    }
+    if levels > 1 && from >= to {
+        return Err(entry.wrong(Problem::Order { from, to }));
+    }
+    Ok(Levels::even(from, to, levels as u32))
+}
+
+fn hue(entry: &Entry) -> Result<Hue, Wrong> {
+    const EXAMPLE: &str = "hue = { levels = 10, saturation = [0.2, 0.6], lightness = [0.2, 0.6] }";
+    let Some(section) = entry.section(&["levels", "saturation", "lightness"]).transpose()? else {
+        return Err(entry.wrong(Problem::Missing { example: EXAMPLE }));
+    };
+    let levels = section.need("levels", EXAMPLE)?.whole()?;
+    let saturation = range(&section.need("saturation", EXAMPLE)?)?;
+    let lightness = range(&section.need("lightness", EXAMPLE)?)?;
+    Ok(Hue { levels: u32::try_from(levels).unwrap_or(u32::MAX), saturation, lightness })
+}

@@ -1,0 +1,261 @@
+//! What a scene is made of: groups of illuminants, of surfaces and of targets.
+
+use crate::model::Model;
+use crate::program::Bounds;
+use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
+
+/// What the groups of all kinds have.
+#[derive(Clone, Debug)]
+pub(super) struct Base {
+    pub(super) name: String,
+    /// None where nothing is drawn from one.
+    pub(super) model: Option<Model>,
+    pub(super) count: u64,
+    pub(super) covariance_scale: f64,
+    pub(super) max_attempts: u32,
+}
+
+/// Lights, so many in each scene.
+#[derive(Clone, Debug)]
+pub struct Illuminants {
+    pub(super) base: Base,
+    pub(super) fixed: bool,
+    pub(super) intensity: Option<(Intensity, Sharing)>,
+    pub(super) mean: Option<Vec<f64>>,
+    pub(super) same_shape: bool,
+}
+
+/// Reflectances, so many in each scene.
+#[derive(Clone, Debug)]
+pub struct Surfaces {
+    pub(super) base: Base,
+    pub(super) fixed: bool,
+}
+
+/// Reflectances that have something given.
+#[derive(Clone, Debug)]
+pub struct Targets {
+    pub(super) base: Base,
+    pub(super) aim: Aim,
+    pub(super) bounds: Bounds,
+    pub(super) copies: Copies,
+}
+
+/// A group of any kind.
+#[derive(Clone, Debug)]
+pub enum Group {
+    /// Lights.
+    Illuminants(Illuminants),
+    /// Reflectances.
+    Surfaces(Surfaces),
+    /// Reflectances that have something given.
+    Targets(Targets),
+}
+
+/// Whose an intensity is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sharing {
+    /// Each light has its own.
+    Each,
+    /// The lights of a scene have the same.
+    Scene,
+}
+
+/// What is given of a target.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Aim {
+    /// The luminous reflectance value (LRV), to which the spectrum is scaled (eq. 9, 10).
+    Lrv(Levels),
+    /// The tristimulus values under D65, where a perfect white has Y = 1: see
+    /// [`RecipeBuilder::xyz`](crate::RecipeBuilder::xyz).
+    Xyz([f64; 3]),
+    /// The same, by hue.
+    Hue(Hue),
+    /// All: the spectrum is its LRV in every band.
+    Flat(Levels),
+}
+
+/// Luminous reflectance values.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Levels {
+    /// These in turn: scene s has number s modulo how many there are.
+    Each(Vec<f64>),
+    /// For each target its own, uniform between these.
+    Uniform(f64, f64),
+}
+
+/// Colours in the hexcone of HSV, whose red, green and blue are linear Rec. 709 components here.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hue {
+    /// How many hues there are, at equal steps from red on: scene s has number s modulo this.
+    pub levels: u32,
+    /// The saturation of each target is uniform between these.
+    pub saturation: (f64, f64),
+    /// And its lightness (the value of HSV) between these.
+    pub lightness: (f64, f64),
+}
+
+/// What the targets of different levels have in common.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Copies {
+    /// Nothing: each is a draw of its own.
+    #[default]
+    Independent,
+    /// The scenes of one round through the levels have one spectrum, scaled to each. A candidate is accepted only if
+    /// all its copies are within bounds, that is, if the lightest is. (The authors' code scales what it accepted at
+    /// another level, and lets some through that are not.)
+    Scaled,
+    /// All scenes have one spectrum, scaled to each level; accepted as the others.
+    SameShape,
+}
+
+impl Levels {
+    /// `levels` values at equal steps, `from` and `to` included.
+    pub fn even(from: f64, to: f64, levels: u32) -> Levels {
+        let step = (to - from) / f64::from(levels.saturating_sub(1).max(1));
+        Levels::Each((0..levels).map(|level| from + step * f64::from(level)).collect())
+    }
+
+    /// That of a scene, where `uniform` is between 0 and 1.
+    pub(super) fn at(&self, scene: u64, uniform: impl FnOnce() -> f64) -> f64 {
+        match self {
+            Levels::Each(levels) => levels[(scene % levels.len() as u64) as usize],
+            Levels::Uniform(low, high) => low + (high - low) * uniform(),
+        }
+    }
+
+    /// The largest.
+    pub(super) fn largest(&self) -> f64 {
+        match self {
+            Levels::Each(levels) => levels.iter().fold(0.0, |a: f64, &b| a.max(b)),
+            Levels::Uniform(_, to) => *to,
+        }
+    }
+}
+
+impl From<f64> for Levels {
+    fn from(level: f64) -> Levels {
+        Levels::Each(vec![level])
+    }
+}
+
+macro_rules! base {
+    ($group:ident) => {
+        impl $group {
+            /// Multiplies the covariance of the model's weights.
+            pub fn covariance_scale(mut self, covariance_scale: f64) -> Self {
+                self.base.covariance_scale = covariance_scale;
+                self
+            }
+
+            /// How many candidates a draw may take ([`DEFAULT_MAX_ATTEMPTS`]).
+            pub fn max_attempts(mut self, max_attempts: u32) -> Self {
+                self.base.max_attempts = max_attempts;
+                self
+            }
+        }
+
+        impl From<$group> for Group {
+            fn from(group: $group) -> Group {
+                Group::$group(group)
+            }
+        }
+    };
+}
+
+base!(Illuminants);
+base!(Surfaces);
+base!(Targets);
+
+impl Illuminants {
+    /// `count` lights a scene.
+    pub fn new(name: &str, model: &Model, count: u64) -> Illuminants {
+        let base = Base::new(name, Some(model), count);
+        Illuminants { base, fixed: false, intensity: None, mean: None, same_shape: false }
+    }
+
+    /// Draws the spectra once for all scenes. Intensities still differ from scene to scene.
+    pub fn fixed(self) -> Self {
+        Illuminants { fixed: true, ..self }
+    }
+
+    /// Multiplies the lights.
+    pub fn intensity(self, intensity: Intensity, sharing: Sharing) -> Self {
+        Illuminants { intensity: Some((intensity, sharing)), ..self }
+    }
+
+    /// Replaces the mean spectrum of the model by this, a value a band in any unit: it is scaled to the mean power of
+    /// the model's.
+    pub fn mean(self, spectrum: &[f64]) -> Self {
+        Illuminants { mean: Some(spectrum.to_vec()), ..self }
+    }
+
+    /// Gives all lights of a scene one spectrum.
+    pub fn same_shape(self) -> Self {
+        Illuminants { same_shape: true, ..self }
+    }
+}
+
+impl Surfaces {
+    /// `count` reflectances a scene.
+    pub fn new(name: &str, model: &Model, count: u64) -> Surfaces {
+        Surfaces { base: Base::new(name, Some(model), count), fixed: false }
+    }
+
+    /// Draws them once for all scenes.
+    pub fn fixed(self) -> Self {
+        Surfaces { fixed: true, ..self }
+    }
+}
+
+impl Targets {
+    /// One target a scene, drawn from a model.
+    pub fn new(name: &str, model: &Model, aim: Aim) -> Targets {
+        let base = Base::new(name, Some(model), 1);
+        Targets { base, aim, bounds: Bounds::default(), copies: Copies::default() }
+    }
+
+    /// One target a scene, the same in every band.
+    pub fn flat(name: &str, levels: Levels) -> Targets {
+        let base = Base::new(name, None, 1);
+        Targets { base, aim: Aim::Flat(levels), bounds: Bounds::default(), copies: Copies::default() }
+    }
+
+    /// `count` targets a scene.
+    pub fn count(mut self, count: u64) -> Self {
+        self.base.count = count;
+        self
+    }
+
+    /// What must lie between 0 and 1 where there is a target LRV.
+    pub fn bounds(self, bounds: Bounds) -> Self {
+        Targets { bounds, ..self }
+    }
+
+    /// What the targets of different levels have in common.
+    pub fn copies(self, copies: Copies) -> Self {
+        Targets { copies, ..self }
+    }
+}
+
+impl Base {
+    pub(super) fn new(name: &str, model: Option<&Model>, count: u64) -> Base {
+        Base {
+            name: name.to_owned(),
+            model: model.cloned(),
+            count,
+            covariance_scale: 1.0,
+            max_attempts: DEFAULT_MAX_ATTEMPTS,
+        }
+    }
+}
+
+impl Group {
+    pub(super) fn base(&self) -> &Base {
+        match self {
+            Group::Illuminants(group) => &group.base,
+            Group::Surfaces(group) => &group.base,
+            Group::Targets(group) => &group.base,
+        }
+    }
+}

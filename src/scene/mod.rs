@@ -1,0 +1,203 @@
+//! Scenes: groups of lights, surfaces and targets that are drawn together, scene by scene.
+//!
+//! A [`Scene`] says what a data set of scenes has in each of them, in code or from a file ([`Scene::open`]). It is
+//! checked as a whole when it is made, and what holds one can be drawn, by an engine ([`Scene::drawer`]) or in a host's
+//! encoder ([`SceneSampler`]).
+//!
+//! What an element of a group is depends on the seed, the name of the group, the number of the scene and that of the
+//! element alone (see [`Stream::in_rows`](crate::Stream::in_rows)): groups may come, go and change places, and any
+//! scene can be drawn alone.
+//!
+//! Nothing is done that a scene does not need. Groups of one model and recipe share a shader, and all groups one
+//! submission a window. What is drawn once for all scenes, and targets, of which there are few, are drawn on the CPU,
+//! and no shader is compiled for them.
+//!
+//! ```
+//! use spectroll::scene::{Aim, Illuminants, Levels, Scene, Sharing, Surfaces, Targets};
+//! use spectroll::{Bounds, Choice, Engine, EngineError, Intensity, Model};
+//!
+//! let (daylight, surfaces) = (Model::builtin("granada")?, Model::builtin("munsell-vrhel")?);
+//! let lights = Illuminants::new("lights", &daylight, 3);
+//! let scene = Scene::new(3000)
+//!     .seed(1)
+//!     .group(lights.intensity(Intensity::LogUniform(0.15, 150.0), Sharing::Scene))
+//!     .group(Surfaces::new("background", &surfaces, 999))
+//!     .group(
+//!         Targets::new("target", &surfaces, Aim::Lrv(Levels::even(0.2, 0.6, 10))).bounds(Bounds::Scaled),
+//!     )
+//!     .build()?;
+//!
+//! let engine = Engine::new(&Choice::Cpu)?;
+//! scene.drawer(&engine)?.draw(0..4, |window| {
+//!     let background = window.values("background"); // (scene, surface, band)
+//!     let scenes = (window.scenes.end - window.scenes.start) as usize;
+//!     assert_eq!(background.len(), scenes * 999 * 31);
+//!     Ok::<_, EngineError>(())
+//! })?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod aim;
+mod cast;
+mod draw;
+mod error;
+mod file;
+mod group;
+mod outline;
+mod reader;
+mod record;
+
+use crate::grid::Grid;
+use crate::stream::Stream;
+
+use cast::Cast;
+pub use cast::{Array, Content, Role};
+pub use draw::{GroupSummary, SceneDrawer, Window};
+use error::{Fault, MAX_COUNT, MAX_DRAWS};
+pub use error::{Place, Problem, SceneError};
+pub use file::PRESETS;
+pub use group::{Aim, Copies, Group, Hue, Illuminants, Levels, Sharing, Surfaces, Targets};
+pub use outline::{GroupOutline, Outline};
+pub use record::{PreparedScene, SceneSampler};
+
+/// What a data set of scenes has in each of them.
+pub struct Scene {
+    scenes: u64,
+    seed: u64,
+    grid: Grid,
+    casts: Vec<Cast>,
+}
+
+/// A scene under construction. See [`Scene::new`].
+#[derive(Clone, Debug)]
+pub struct SceneBuilder {
+    scenes: u64,
+    seed: u64,
+    wavelengths: Option<Grid>,
+    groups: Vec<Group>,
+}
+
+impl Scene {
+    /// Starts a data set of so many scenes, with nothing in them. [`SceneBuilder::build`] ends it.
+    #[allow(clippy::new_ret_no_self)] // an unchecked scene cannot exist
+    pub fn new(scenes: u64) -> SceneBuilder {
+        SceneBuilder { scenes, seed: 0, wavelengths: None, groups: Vec::new() }
+    }
+
+    /// How many scenes there are.
+    pub fn scenes(&self) -> u64 {
+        self.scenes
+    }
+
+    /// The seed.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// The wavelengths.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The names of the groups.
+    pub fn groups(&self) -> impl Iterator<Item = &str> {
+        self.casts.iter().map(|cast| cast.name.as_str())
+    }
+
+    /// Every array, group by group.
+    pub fn arrays(&self) -> impl Iterator<Item = &Array> {
+        self.casts.iter().flat_map(|cast| &cast.arrays)
+    }
+
+    /// The scene with one of its groups alone, whose draws stay what they are; `None` where there is no such group.
+    pub fn only(mut self, group: &str) -> Option<Scene> {
+        self.casts.retain(|cast| cast.name == group);
+        (!self.casts.is_empty()).then_some(self)
+    }
+}
+
+impl SceneBuilder {
+    /// The seed (0).
+    pub fn seed(self, seed: u64) -> Self {
+        SceneBuilder { seed, ..self }
+    }
+
+    /// The wavelengths, which the models must have (those of the first model).
+    pub fn wavelengths(self, grid: Grid) -> Self {
+        SceneBuilder { wavelengths: Some(grid), ..self }
+    }
+
+    /// Adds a group.
+    pub fn group(mut self, group: impl Into<Group>) -> Self {
+        self.groups.push(group.into());
+        self
+    }
+
+    /// The scene, if it can be drawn.
+    pub fn build(self) -> Result<Scene, SceneError> {
+        self.checked().map_err(|fault| {
+            let group = fault.group.map(|group| self.groups[group].base().name.clone());
+            let place = Place { group, key: fault.key.to_owned(), ..Place::default() };
+            SceneError::new(place, fault.problem)
+        })
+    }
+
+    /// The scene, or what is wrong with it and whose it is.
+    fn checked(&self) -> Result<Scene, Fault> {
+        if !(1..=1 << 32).contains(&self.scenes) {
+            return Err(Fault::of_scene("scenes", Problem::Scenes(self.scenes)));
+        }
+        if self.groups.is_empty() {
+            return Err(Fault::of_scene("", Problem::NoGroups));
+        }
+        for (number, group) in self.groups.iter().enumerate() {
+            let name = &group.base().name;
+            let fault = |key, problem| Err(Fault::of_group(number, key, problem));
+            let mut letters = name.chars();
+            let is_name = letters.next().is_some_and(|c| c.is_ascii_alphabetic())
+                && letters.all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+            if !is_name {
+                return fault("name", Problem::Name(name.clone()));
+            }
+            let id = |name: &str| Stream::named(0, name).id();
+            for other in self.groups[..number].iter().map(|other| &other.base().name) {
+                if other == name {
+                    return fault("name", Problem::SameName(name.clone()));
+                }
+                if id(other) == id(name) {
+                    return fault("name", Problem::SameStream(other.clone()));
+                }
+            }
+            if !(1..=MAX_COUNT).contains(&group.base().count) {
+                return fault("count", Problem::Count(group.base().count));
+            }
+        }
+        let each = |group: &&Group| match group {
+            Group::Illuminants(group) => !group.fixed,
+            Group::Surfaces(group) => !group.fixed,
+            Group::Targets(_) => true,
+        };
+        let per_scene = self.groups.iter().filter(each).map(|group| group.base().count as f64).sum::<f64>();
+        let draws = per_scene * self.scenes as f64;
+        if draws > MAX_DRAWS {
+            return Err(Fault::of_scene("scenes", Problem::Draws { draws }));
+        }
+        let grid = self.wavelengths.or_else(|| {
+            let mut models = self.groups.iter().filter_map(|group| group.base().model.as_ref());
+            models.next().map(|model| model.grid())
+        });
+        let grid = grid.unwrap_or(Grid::DEFAULT);
+        let casts = self.groups.iter().enumerate();
+        let casts: Vec<_> =
+            casts.map(|(i, group)| Cast::new(i, group, grid, self.seed)).collect::<Result<_, _>>()?;
+        let names = |cast: &'_ Cast| cast.arrays.iter().map(|a| a.name.clone()).collect::<Vec<_>>();
+        for (number, cast) in casts.iter().enumerate() {
+            let clash =
+                casts[..number].iter().find(|other| names(other).iter().any(|n| names(cast).contains(n)));
+            if let Some(other) = clash {
+                return Err(Fault::of_group(number, "name", Problem::SameArray(other.name.clone())));
+            }
+        }
+        Ok(Scene { scenes: self.scenes, seed: self.seed, grid, casts })
+    }
+}
