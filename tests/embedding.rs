@@ -1,5 +1,7 @@
 //! Spectroll as a guest: on a host's device with no features and small limits, in its encoders and in its shaders.
 
+#![allow(clippy::duplicate_mod)] // both examples have the host's boilerplate
+
 use spectroll::{
     Layout, Model, Quantity, Recipe, Sampler, SamplerError, Stream, colorimetry,
     wgpu::{self, BufferUsages},

@@ -27,7 +27,7 @@ fn file(table: &str, key: &str, line: &str) -> String {
                 false => text += &format!("{other}\n"),
             }
         }
-        if replaces && !line.is_empty() && !lines.iter().any(|other| is_key(&other)) {
+        if replaces && !line.is_empty() && !lines.iter().any(is_key) {
             text += &format!("{line}\n");
         }
     }

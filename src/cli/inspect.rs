@@ -10,10 +10,11 @@ use std::path::PathBuf;
 
 use spectroll::{Model, Normalization, Recipe, RecipeError};
 
-use super::{existing, picture};
+use super::request::Request;
+use super::{existing, grouped, picture};
 
 /// Show what a model is: a table, and a picture where asked
-#[derive(Debug, clap::Args)]
+#[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// The model: a file, or the name of a built-in one
     #[arg(value_name = "MODEL")]
@@ -22,6 +23,9 @@ pub(crate) struct Arguments {
     /// Draw the model into this file, .svg or .png
     #[arg(short, long, value_name = "PATH")]
     pub(crate) output: Option<PathBuf>,
+
+    #[command(flatten)]
+    request: Request,
 
     /// The seed of the draws in the picture
     #[arg(long, default_value_t = 0)]
@@ -36,7 +40,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::Format::of).transpose()?;
     let model = super::model(&arguments.model)?;
-    let recipe = Recipe::new(&model).build();
+    let recipe = arguments.request.recipe(&model);
     if let (Some(path), Some(format)) = (&arguments.output, format) {
         let figure = picture::Picture { model: &model, recipe: recipe.as_ref().ok(), seed: arguments.seed };
         figure.write(path, format, existing(arguments.force))?;
@@ -59,7 +63,16 @@ fn table(name: &str, model: &Model, recipe: &Result<Recipe, RecipeError>) -> Str
     for (index, source) in model.parts().sources.iter().enumerate() {
         line(&mut text, if index == 0 { "sources" } else { "" }, source);
     }
-    line(&mut text, "acceptance", &acceptance(recipe));
+    if let Some(largest) = Recipe::largest_lrv(model) {
+        line(&mut text, "LRV", &format!("scaled reflectances reach any above 0 and below {largest:.6}"));
+    }
+    match recipe {
+        Ok(recipe) => {
+            line(&mut text, "probability", &format!("{} (estimated)", share(recipe.probability())));
+            line(&mut text, "candidates", &candidates(recipe));
+        }
+        Err(e) => line(&mut text, "refused", &e.to_string()),
+    }
     text.push('\n');
     components(&mut text, model);
     text
@@ -103,10 +116,25 @@ fn normalization(normalization: Normalization) -> &'static str {
     }
 }
 
-fn acceptance(recipe: &Result<Recipe, RecipeError>) -> String {
-    match recipe {
-        Ok(recipe) => format!("{:.2} % of plain draws are physical (estimated)", 100.0 * recipe.acceptance()),
-        Err(e) => format!("plain draws are refused: {e}"),
+/// Where candidates come from, and what that costs.
+fn candidates(recipe: &Recipe) -> String {
+    let each = 1.0 / recipe.acceptance();
+    match recipe.cover() {
+        None => format!("the model's Gaussian: {each:.2} for each draw"),
+        Some((boxes, bytes)) => format!(
+            "{} boxes, a table of {} KB: {each:.2} for each draw, at about twice the cost of the Gaussian's, of which \
+             a draw would take {:.3e}",
+            grouped(boxes as u64),
+            bytes / 1000,
+            1.0 / recipe.probability()
+        ),
+    }
+}
+
+fn share(probability: f64) -> String {
+    match probability {
+        0.01.. => format!("{:.2} % of the model's spectra obey the rule", 100.0 * probability),
+        _ => format!("{probability:.3e} of the model's spectra obey the rule"),
     }
 }
 

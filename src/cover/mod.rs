@@ -24,12 +24,15 @@ mod text;
 use alias::{Alias, odds};
 use hat::Axis;
 use partition::partition;
-use simplex::{Polytope, Sides};
+#[cfg(test)]
+use simplex::Polytope;
+use simplex::Sides;
 
 pub(crate) use frame::Frame;
 pub(crate) use proposal::Proposal;
 
 use crate::region::HalfSpace;
+#[cfg(test)]
 use crate::stream::Stream;
 
 /// The most boxes of a cover. Twice as many would accept a tenth more, of a table twice the size.
@@ -48,6 +51,7 @@ const COST: f64 = 2.0;
 pub(crate) struct Cover {
     frame: Frame,
     /// What is accepted, in the frame's coordinates relative to its centre.
+    #[cfg(test)]
     polytope: Polytope,
     boxes: Vec<Sides>,
     proposal: Proposal<f64>,
@@ -56,6 +60,7 @@ pub(crate) struct Cover {
 }
 
 /// What candidates tell of a region.
+#[cfg(test)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Estimate {
     /// The share of candidates that are accepted.
@@ -86,7 +91,7 @@ impl Cover {
     fn of_boxes(half_spaces: &[HalfSpace], within: &[f64], most: usize) -> Option<Cover> {
         let cuts: Vec<_> = half_spaces.iter().filter(|h| h.cuts()).collect();
         let frame = Frame::new(&cuts, within);
-        let mut polytope = frame.polytope(&cuts);
+        let polytope = frame.polytope(&cuts);
         let boxes = partition(&polytope, most);
         if boxes.is_empty() {
             return None;
@@ -101,8 +106,14 @@ impl Cover {
             axes: axes.iter().flatten().map(|axis| axis.numbers).collect(),
             components: within.len(),
         };
-        polytope.move_to(frame.centre.as_slice());
-        Some(Cover { frame, polytope, boxes, proposal, mass: 2f64.powi(32) / unit })
+        Some(Cover {
+            #[cfg(test)]
+            polytope: polytope.around(frame.centre.as_slice()),
+            frame,
+            boxes,
+            proposal,
+            mass: 2f64.powi(32) / unit,
+        })
     }
 
     /// The coordinates in which candidates are proposed.
@@ -120,7 +131,13 @@ impl Cover {
         self.boxes.len()
     }
 
-    /// Tries the first `count` candidates of a stream.
+    /// The probability of the boxes, with their hats, of which the region's is the share that is accepted.
+    pub(crate) fn mass(&self) -> f64 {
+        self.mass
+    }
+
+    /// Tries the first `count` candidates of a stream, in f64.
+    #[cfg(test)]
     pub(crate) fn estimate(&self, stream: Stream, count: u64) -> Estimate {
         let mut coordinates = vec![[0.0]; self.proposal.components];
         let accepted = (0..count).filter(|&i| {

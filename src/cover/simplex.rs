@@ -38,13 +38,16 @@ impl Polytope {
         &self.normals[row * self.dimensions..(row + 1) * self.dimensions]
     }
 
-    /// Makes `centre` the origin.
-    pub(super) fn move_to(&mut self, centre: &[f64]) {
+    /// The same with `centre` as the origin.
+    #[cfg(test)]
+    pub(super) fn around(mut self, centre: &[f64]) -> Polytope {
         for row in 0..self.rooms.len() {
             self.rooms[row] -= dot(self.normal(row), centre);
         }
+        self
     }
 
+    #[cfg(test)]
     pub(super) fn contains(&self, y: &[f64]) -> bool {
         (0..self.rooms.len()).all(|row| dot(self.normal(row), y) < self.rooms[row])
     }

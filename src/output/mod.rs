@@ -263,7 +263,6 @@ mod tests {
         };
         assert!(error(Format::Npy, &schema(&[&spectra, &lrv])).contains("hold one array"));
         assert!(error(Format::Spd, &schema(&[&lrv])).contains("hold spectra"));
-        let shares = !schema.constants.is_empty();
         let halves = schema(&[&spectra.clone().stored_as(Element::F16)]);
         assert_eq!(error(Format::Npy, &halves), "");
         #[cfg(feature = "hdf5")]

@@ -84,6 +84,7 @@ impl Field {
     }
 
     /// Whether a draw has a list of values, rather than one.
+    #[cfg(any(feature = "hdf5", feature = "parquet"))]
     pub(super) fn is_list(&self) -> bool {
         self.axis.is_some() || self.outer.is_some()
     }

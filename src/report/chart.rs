@@ -83,6 +83,11 @@ impl Axis {
         let limits = (round_down(low / 1.1), 1.0 / round_down(1.0 / (1.1 * high)));
         Axis { label: label.to_owned(), limits, logarithmic: true }
     }
+
+    /// What values are divided by to be plotted: kuva takes all below 1e-10 for that on a logarithmic axis.
+    fn unit(&self) -> f64 {
+        if self.logarithmic && self.limits.0 < 1e-9 { round_down(self.limits.0) } else { 1.0 }
+    }
 }
 
 /// The largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, 10, ... that is at most `value`.
@@ -100,29 +105,29 @@ impl Series {
         Series { band: Some(band), ..self }
     }
 
-    fn plots(&self) -> Vec<Plot> {
+    fn plots(&self, (x_unit, y_unit): (f64, f64)) -> Vec<Plot> {
         let mut plots = Vec::new();
+        let points: Vec<_> = self.points.iter().map(|p| (p.0 / x_unit, p.1 / y_unit)).collect();
         if let Some(band) = &self.band {
-            let x = self.points.iter().map(|p| p.0);
-            let (low, high) = (band.iter().map(|b| b.0), band.iter().map(|b| b.1));
+            let x = points.iter().map(|p| p.0);
+            let (low, high) = (band.iter().map(|b| b.0 / y_unit), band.iter().map(|b| b.1 / y_unit));
             plots.push(BandPlot::new(x, low, high).with_color(self.colour).with_opacity(0.2).into());
         }
-        let line = || LinePlot::new().with_data(self.points.clone()).with_color(self.colour);
+        let line = || LinePlot::new().with_data(points.clone()).with_color(self.colour);
         match self.style {
             Style::Line => plots.push(line().with_stroke_width(1.8).into()),
             Style::Dashed => plots.push(line().with_stroke_width(1.3).with_dashed().into()),
             Style::Dotted => plots.push(line().with_stroke_width(1.6).with_dotted().into()),
             Style::Plain => plots.push(line().with_stroke_width(1.8).into()),
             Style::Steps => {
-                let corners = self.points.windows(2).flat_map(|w| [w[0], (w[1].0, w[0].1)]);
+                let corners = points.windows(2).flat_map(|w| [w[0], (w[1].0, w[0].1)]);
                 let steps = LinePlot::new().with_data(corners.collect::<Vec<_>>()).with_color(self.colour);
                 plots.push(steps.with_stroke_width(1.8).into());
             }
             Style::Points => {}
         }
         if matches!(self.style, Style::Line | Style::Points) {
-            let points =
-                ScatterPlot::new().with_data(self.points.clone()).with_color(self.colour).with_size(3.6);
+            let points = ScatterPlot::new().with_data(points.clone()).with_color(self.colour).with_size(3.6);
             plots.push(points.into());
         }
         plots
@@ -135,7 +140,8 @@ impl Chart {
         let keys = self.keys();
         let rows = keys.iter().map(|key| key.row + 1).max().unwrap_or(0);
         let top = HEADING + KEY_ROW * rows as f64;
-        let plots: Vec<Plot> = self.series.iter().flat_map(Series::plots).collect();
+        let units = (self.x.unit(), self.y.unit());
+        let plots: Vec<Plot> = self.series.iter().flat_map(|series| series.plots(units)).collect();
         let mut scene = Figure::new(1, 1)
             .with_plots(vec![plots])
             .with_layouts(vec![self.layout(top)])
@@ -159,9 +165,10 @@ impl Chart {
             legend_border: "none".into(),
             ..Theme::light()
         };
-        let ((x_low, x_high), (y_low, y_high)) = (self.x.limits, self.y.limits);
+        let plotted = |axis: &Axis| (axis.limits.0 / axis.unit(), axis.limits.1 / axis.unit());
+        let ((x_low, x_high), (y_low, y_high)) = (plotted(&self.x), plotted(&self.y));
         let [left, right, bottom] = MARGINS;
-        let mut layout = Layout::new(self.x.limits, self.y.limits)
+        let mut layout = Layout::new((x_low, x_high), (y_low, y_high))
             .with_x_axis_min(x_low)
             .with_x_axis_max(x_high)
             .with_y_axis_min(y_low)
@@ -176,10 +183,10 @@ impl Chart {
             .with_label_size(LABEL_SIZE)
             .with_tick_size(LABEL_SIZE - 1);
         if self.x.logarithmic {
-            layout = layout.with_log_x().with_x_tick_format(powers(self.x.limits));
+            layout = layout.with_log_x().with_x_tick_format(powers(&self.x));
         }
         if self.y.logarithmic {
-            layout = layout.with_log_y().with_y_tick_format(powers(self.y.limits));
+            layout = layout.with_log_y().with_y_tick_format(powers(&self.y));
         }
         layout
     }
@@ -264,9 +271,11 @@ fn set_heading(element: &mut Primitive) {
 
 /// Powers of ten as such, unless all are short. What lies between them is named where there is room, on axes of two
 /// decades or less.
-fn powers((low, high): (f64, f64)) -> TickFormat {
+fn powers(axis: &Axis) -> TickFormat {
+    let ((low, high), unit) = (axis.limits, axis.unit());
     let (few, short) = (high / low < 101.0, low > 0.9e-3 && high < 1.1e4);
     TickFormat::Custom(Arc::new(move |value| {
+        let value = value * unit;
         let exponent = value.log10().floor() as i32;
         let digit = (value / 10f64.powi(exponent)).round();
         let (digit, exponent) = if digit == 10.0 { (1.0, exponent + 1) } else { (digit, exponent) };

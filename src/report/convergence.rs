@@ -117,12 +117,21 @@ fn reference(
         whole.merge(&moments);
     }
     let estimate = whole.estimate();
-    let own = [0, 1, 2].map(|quantity| {
-        let errors: Vec<f64> = parts.iter().map(|part| part.errors(&estimate)[quantity]).collect();
-        root_mean_square(&errors) / (PARTS as f64 - 1.0).sqrt()
-    });
-    let reference =
-        Reference { draws, errors: own, acceptance: estimate.acceptance, deviation: whole.deviation() };
+    // By formula where there is one; the covariance's from how much the parts differ.
+    let n = draws as f64;
+    let apart: Vec<f64> = parts.iter().map(|part| part.errors(&estimate)[1]).collect();
+    let deviation = whole.deviation();
+    let p = estimate.acceptance;
+    let reference = Reference {
+        draws,
+        errors: [
+            deviation / n.sqrt(),
+            root_mean_square(&apart) / (PARTS as f64 - 1.0).sqrt(),
+            p * ((1.0 - p) / n).sqrt(),
+        ],
+        acceptance: p,
+        deviation,
+    };
     Ok((reference, estimate))
 }
 

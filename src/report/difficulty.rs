@@ -7,7 +7,7 @@ use super::{Bench, ReportError};
 use crate::dataset::Kind;
 use crate::model::Model;
 use crate::program::Bounds;
-use crate::recipe::{Recipe, RecipeBuilder};
+use crate::recipe::{Proposal, Recipe, RecipeBuilder, RecipeError};
 use crate::stream::Stream;
 
 /// Cost against difficulty.
@@ -30,6 +30,10 @@ pub struct Task {
     pub engine: usize,
     /// How many draws each run made.
     pub draws: u64,
+    /// Whether candidates came from a cover.
+    pub covered: bool,
+    /// The probability that a spectrum of the model obeys the rule.
+    pub probability: f64,
     /// The share of candidates that were accepted.
     pub acceptance: f64,
     /// Nanoseconds an accepted draw, the median of 3 runs.
@@ -45,15 +49,21 @@ impl Task {
 
 pub(super) fn measure(bench: &Bench, name: &str, model: &Model) -> Result<Difficulty, ReportError> {
     let (mut tasks, mut refused) = (Vec::new(), Vec::new());
-    let candidates = bench.effort.pick(1e6, 1e7, 3e7);
-    for (task, by_scale, builder) in recipes(bench, model) {
+    let candidates = bench.effort.pick(3e5, 1e7, 3e7);
+    let both = |(task, by_scale, builder): (String, bool, RecipeBuilder)| {
+        [Proposal::Plain, Proposal::Cover].map(|p| (task.clone(), by_scale, p, builder.clone().proposal(p)))
+    };
+    for (task, by_scale, proposal, builder) in recipes(bench, model).into_iter().flat_map(both) {
         let recipe = match builder.build() {
             Ok(recipe) => recipe,
+            // Of what plain rejection cannot reach, and models too large for a cover, the other tells.
+            Err(RecipeError::Hopeless { .. } | RecipeError::NoCover { .. }) => continue,
             Err(e) => {
                 refused.push(format!("{task}: {e}"));
                 continue;
             }
         };
+        let covered = proposal == Proposal::Cover;
         bench.say(&format!("{name}: {task}"))?;
         for (engine, target) in bench.targets.iter().enumerate() {
             // f64 is ten times as slow, and no one draws with it.
@@ -73,6 +83,8 @@ pub(super) fn measure(bench: &Bench, name: &str, model: &Model) -> Result<Diffic
                 by_scale,
                 engine,
                 draws,
+                covered,
+                probability: recipe.probability(),
                 acceptance: 3.0 * draws as f64 / attempts as f64,
                 nanoseconds: 1e9 * median(&seconds) / draws as f64,
             });
@@ -81,20 +93,20 @@ pub(super) fn measure(bench: &Bench, name: &str, model: &Model) -> Result<Diffic
     Ok(Difficulty { tasks, refused })
 }
 
-/// Recipes from easy to the cap on attempts, and beyond it.
+/// Recipes from easy to what no plain rejection reaches.
 fn recipes(bench: &Bench, model: &Model) -> Vec<(String, bool, RecipeBuilder)> {
     let scales = bench.effort.pick(
-        vec![0.01, 1.0, 4.0, 25.0, 100.0, 250.0],
-        vec![0.01, 0.1, 1.0, 2.0, 4.0, 10.0, 25.0, 50.0, 100.0, 150.0, 250.0],
-        vec![0.01, 0.1, 1.0, 2.0, 4.0, 10.0, 25.0, 50.0, 100.0, 150.0, 200.0, 250.0],
+        vec![0.01, 1.0, 4.0, 25.0, 100.0, 1e4, 1e6],
+        vec![0.01, 0.1, 1.0, 2.0, 4.0, 10.0, 25.0, 50.0, 100.0, 250.0, 1e3, 1e4, 1e5, 1e6],
+        vec![0.01, 0.1, 1.0, 2.0, 4.0, 10.0, 25.0, 50.0, 100.0, 150.0, 250.0, 1e3, 1e4, 1e5, 1e6],
     );
     let scaled = |c: f64| (format!("covariance × {c}"), true, Recipe::new(model).covariance_scale(c));
     let targets = match model.kind() {
         Kind::Illuminant => vec![],
         Kind::Reflectance => bench.effort.pick(
-            vec![0.2, 0.6, 0.9, 0.95, 0.99],
-            vec![0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.97, 0.99],
-            vec![0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.97, 0.98, 0.99],
+            vec![0.2, 0.6, 0.9, 0.95, 0.99, 0.992],
+            vec![0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.97, 0.98, 0.99, 0.992],
+            vec![0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.97, 0.98, 0.985, 0.99, 0.992],
         ),
     };
     let target =

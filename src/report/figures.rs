@@ -234,25 +234,39 @@ impl Drawing<'_> {
         let mut series = Vec::new();
         for engine in 0..self.report.engines.len() {
             let (name, colour) = self.engine(engine);
-            let mut points: Vec<_> =
-                tasks.iter().filter(|t| t.engine == engine).map(|t| (t.acceptance, t.nanoseconds)).collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let of = |covered: bool| {
+                let tasks = tasks.iter().filter(|t| t.engine == engine && t.covered == covered);
+                let mut points: Vec<_> = tasks.map(|t| (t.probability, t.nanoseconds)).collect();
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                points
+            };
+            let points = of(false);
             let Some(&(easiest, cost)) = points.last() else { continue };
             let guide = [points[0].0, easiest].map(|a| (a, cost * easiest / a)).to_vec();
             series.push(Series::new("", colour, Style::Dashed, guide));
+            series.push(Series::new(&format!("{name}, cover"), colour, Style::Line, of(true)));
             series.push(Series::new(name, colour, Style::Points, points));
         }
-        series.push(Series::new("constant cost of a candidate", GUIDE, Style::Dashed, Vec::new()));
+        series.push(Series::new(
+            "plain rejection, at a constant cost of a candidate",
+            GUIDE,
+            Style::Dashed,
+            Vec::new(),
+        ));
         let values = || series.iter().flat_map(|s| &s.points);
         let chart = Chart {
-            title: "Cost of an accepted draw against acceptance".to_owned(),
-            x: Axis::decades("share of candidates that are accepted", values().map(|p| p.0)),
+            title: "Cost of an accepted draw against the probability of the acceptable".to_owned(),
+            x: Axis::decades(
+                "probability that a spectrum of the model obeys the rule",
+                values().map(|p| p.0),
+            ),
             y: Axis::decades("nanoseconds for an accepted draw", values().map(|p| p.1)),
             series,
         };
         let see = format!(
-            "On its broken line a draw costs as much as its candidates, however many they are. Points below it are of \
-             candidates that cost less than the easiest draw: most are not stored. {}",
+            "Single points are of plain rejection: on its broken line a draw costs as much as its candidates, however \
+             many they are, and points below it are of candidates that cost less than the easiest draw, since most are \
+             not stored. Joined points are of a cover, which reaches where plain rejection cannot. {}",
             self.refused()
         );
         let draws = tasks.iter().map(|t| t.draws);
@@ -274,8 +288,12 @@ impl Drawing<'_> {
 
     fn attempts(&self) -> Figure {
         let points = |by_scale: bool| {
-            let tasks =
-                self.model.difficulty.tasks.iter().filter(|t| t.engine == 0 && t.by_scale == by_scale);
+            let tasks = self
+                .model
+                .difficulty
+                .tasks
+                .iter()
+                .filter(|t| t.engine == 0 && t.by_scale == by_scale && !t.covered);
             let value = |name: &str| name.trim_start_matches("covariance × ").parse().unwrap_or(0.0);
             tasks.map(|t| (value(&t.name), t.attempts())).collect::<Vec<(f64, f64)>>()
         };

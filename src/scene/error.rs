@@ -12,7 +12,7 @@ use crate::recipe::RecipeError;
 #[error("{place}: {problem}")]
 pub struct SceneError {
     place: Place,
-    problem: Problem,
+    problem: Box<Problem>,
 }
 
 /// Where something is wrong.
@@ -130,7 +130,7 @@ impl Fault {
 
 impl SceneError {
     pub(super) fn new(place: Place, problem: Problem) -> SceneError {
-        SceneError { place, problem }
+        SceneError { place, problem: Box::new(problem) }
     }
 
     /// Where something is wrong.

@@ -65,7 +65,7 @@ impl Scene {
         })?;
         let file = Reader { folder, models: HashMap::new() }
             .scene(table.get_ref())
-            .map_err(|wrong| error(Some(wrong.span), wrong.group, wrong.key, wrong.problem))?;
+            .map_err(|wrong| error(Some(wrong.span), wrong.group, wrong.key, *wrong.problem))?;
         file.builder.checked().map_err(|fault| {
             let spans = fault.group.map_or(&file.spans, |group| &file.groups[group].spans);
             let own = spans.iter().find(|(key, _)| *key == fault.key).map(|(_, span)| span.clone());
@@ -256,14 +256,9 @@ fn range(entry: &Entry) -> Result<(f64, f64), Wrong> {
 
 fn intensity(entry: &Entry) -> Result<(Intensity, Sharing), Wrong> {
     let Some(section) = entry.section(&["log_uniform", "from_data", "shared"]).transpose()? else {
-        return match entry.number() {
-            Ok(number) => Ok((Intensity::Fixed(number), Sharing::Scene)),
-            Err(Wrong { problem: Problem::Type { found, .. }, .. }) => {
-                let expected = "a number, { log_uniform = [0.15, 150] } or { from_data = true }";
-                Err(entry.wrong(Problem::Type { expected, found }))
-            }
-            Err(other) => Err(other),
-        };
+        let expected = "a number, { log_uniform = [0.15, 150] } or { from_data = true }";
+        let number = entry.number().map_err(|wrong| wrong.expecting(expected))?;
+        return Ok((Intensity::Fixed(number), Sharing::Scene));
     };
     let sharing = if flag(&section, "shared")? { Sharing::Scene } else { Sharing::Each };
     match (section.get("log_uniform"), section.get("from_data")) {
@@ -285,15 +280,8 @@ fn levels(entry: &Entry) -> Result<Levels, Wrong> {
         return Ok(Levels::Each(list));
     }
     let Some(section) = entry.section(&["from", "to", "levels", "uniform"]).transpose()? else {
-        return match entry.number() {
-            Ok(level) => Ok(Levels::from(level)),
-            Err(Wrong { problem: Problem::Type { found, .. }, .. }) => {
-                let expected =
-                    "a number, a list, { from = 0.2, to = 0.6, levels = 10 } or { uniform = [0.2, 0.6] }";
-                Err(entry.wrong(Problem::Type { expected, found }))
-            }
-            Err(other) => Err(other),
-        };
+        let expected = "a number, a list, { from = 0.2, to = 0.6, levels = 10 } or { uniform = [0.2, 0.6] }";
+        return entry.number().map(Levels::from).map_err(|wrong| wrong.expecting(expected));
     };
     if let Some(uniform) = section.get("uniform") {
         if let Some(other) = ["from", "to", "levels"].into_iter().find_map(|key| section.get(key)) {

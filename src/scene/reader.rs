@@ -18,7 +18,17 @@ pub(super) struct Wrong {
     /// The name of the group, as far as it is known.
     pub(super) group: Option<String>,
     pub(super) key: String,
-    pub(super) problem: Problem,
+    pub(super) problem: Box<Problem>,
+}
+
+impl Wrong {
+    /// The same, where it is a type, with all that is taken there.
+    pub(super) fn expecting(mut self, all: &'static str) -> Wrong {
+        if let Problem::Type { expected, .. } = &mut *self.problem {
+            *expected = all;
+        }
+        self
+    }
 }
 
 /// A table of which the keys are known.
@@ -57,10 +67,10 @@ impl<'a> Section<'a> {
                 span: key.span(),
                 group: section.group.clone(),
                 key: section.join(key.get_ref()),
-                problem: Problem::UnknownKey {
+                problem: Box::new(Problem::UnknownKey {
                     suggestion: closest(key.get_ref(), known.iter().copied()),
                     known: known.join(", "),
-                },
+                }),
             }),
         }
     }
@@ -90,7 +100,7 @@ impl<'a> Section<'a> {
     /// A complaint about the table, under a key that it lacks.
     pub(super) fn wrong(&self, key: &str, problem: Problem) -> Wrong {
         let key = if key.is_empty() { self.path.clone() } else { self.join(key) };
-        Wrong { span: self.span.clone(), group: self.group.clone(), key, problem }
+        Wrong { span: self.span.clone(), group: self.group.clone(), key, problem: Box::new(problem) }
     }
 
     /// Where each key is.
@@ -102,7 +112,12 @@ impl<'a> Section<'a> {
 impl<'a> Entry<'a> {
     /// A complaint about the value.
     pub(super) fn wrong(&self, problem: Problem) -> Wrong {
-        Wrong { span: self.span.clone(), group: self.group.clone(), key: self.path.clone(), problem }
+        Wrong {
+            span: self.span.clone(),
+            group: self.group.clone(),
+            key: self.path.clone(),
+            problem: Box::new(problem),
+        }
     }
 
     fn is_not(&self, expected: &'static str) -> Wrong {

@@ -9,7 +9,7 @@ use crate::dataset::Kind;
 use crate::engine::Engine;
 use crate::model::Model;
 use crate::program::Bounds;
-use crate::recipe::{Recipe, RecipeBuilder, RecipeError};
+use crate::recipe::{Proposal, Recipe, RecipeBuilder, RecipeError};
 use crate::stream::Stream;
 
 pub(super) const CASES: &[Case] = &[
@@ -41,7 +41,7 @@ fn one_varies(mean: f64) -> Model {
 
 /// The share of draws in (0, 1) must be that of the normal distribution, to its standard error.
 fn share(engine: &Engine, mean: f64) -> Answer {
-    let recipe = build(Recipe::new(&one_varies(mean)))?;
+    let recipe = build(Recipe::new(&one_varies(mean)).proposal(Proposal::Plain))?;
     let below = |x: f64| erfc(-x / std::f64::consts::SQRT_2) / 2.0;
     let expected = below((1.0 - mean) / 0.1) - below(-mean / 0.1);
     let examined = examine(engine, &recipe, Stream::named(4, "stress").draws(0..DRAWS))?;
@@ -62,11 +62,17 @@ fn on_bound(engine: &Engine) -> Answer {
 fn outside(engine: &Engine) -> Answer {
     let drawn = [1.0, 2.0, 3.0].map(|d| (format!("{d}"), share(engine, -0.1 * d)));
     let hopeless = |e: &RecipeError| matches!(e, RecipeError::Hopeless { .. });
+    let covered = [4.0, 5.0, 6.0].map(|d| {
+        (
+            format!("{d}, from a cover"),
+            super::examine::drawn(engine, Recipe::new(&one_varies(-0.1 * d)), ERROR),
+        )
+    });
     let refused = [4.0, 5.0, 6.0].map(|d| {
-        let answer = refused(Recipe::new(&one_varies(-0.1 * d)), hopeless);
+        let answer = refused(Recipe::new(&one_varies(-0.1 * d)).proposal(Proposal::Plain), hopeless);
         (format!("{d}"), answer.and_then(|_| good("refused as hopeless")))
     });
-    all(drawn.into_iter().chain(refused))
+    all(drawn.into_iter().chain(covered).chain(refused))
 }
 
 /// The answer of a recipe that may be drawn to within `bound`, or be refused for want of room in f32.
@@ -108,12 +114,13 @@ fn denormal(engine: &Engine) -> Answer {
 
 fn scales(engine: &Engine) -> Answer {
     let model = builtin("munsell-vrhel");
-    let drawn = [1e-12, 1e-6, 1.0, 100.0].map(|scale| {
+    let drawn = [1e-12, 1e-6, 1.0, 100.0, 1e4, 1e6].map(|scale| {
         (format!("{scale:e}"), drawn(engine, Recipe::new(&model).covariance_scale(scale), ERROR))
     });
     let refused = [1e4, 1e6].map(|scale| {
-        let builder = Recipe::new(&model).covariance_scale(scale);
-        (format!("{scale:e}"), refused(builder, |e| matches!(e, RecipeError::Hopeless { .. })))
+        let builder = Recipe::new(&model).covariance_scale(scale).proposal(Proposal::Plain);
+        let answer = refused(builder, |e| matches!(e, RecipeError::Hopeless { .. }));
+        (format!("{scale:e} by plain rejection"), answer)
     });
     all(drawn.into_iter().chain(refused))
 }

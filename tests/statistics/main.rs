@@ -13,7 +13,7 @@ use broken::{Fault, Pipeline};
 use spectroll::statistics::{
     self, Check, EDGE, KNOWN, Sample, Sampler, Scenario, battery, sigmas, smallest_errors,
 };
-use spectroll::{Bounds, Choice, Engine, EngineError, Model, Recipe, Stream};
+use spectroll::{Bounds, Choice, Engine, EngineError, Model, Proposal, Recipe, Stream};
 
 /// Draws of a sample of the engine, and of its reference.
 const DRAWS: u64 = 1 << 18;
@@ -187,7 +187,7 @@ fn acceptance_is_what_numpy_measured() {
     assert_eq!(table.len(), TABLE_RUNS);
     let engine = cpu();
     for (name, recipe, expected, rounding) in table {
-        let recipe = recipe.build().expect("the recipe can be drawn");
+        let recipe = recipe.proposal(Proposal::Plain).build().expect("the recipe can be drawn");
         let draws = (1e6 * expected) as u64;
         let summary =
             engine.draw(&recipe, Stream::named(SEED, name).draws(0..draws), |_| Ok::<_, EngineError>(()));

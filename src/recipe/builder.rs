@@ -1,0 +1,311 @@
+//! From what is asked for to a recipe, if it can be drawn.
+
+use rayon::prelude::*;
+
+use super::error::{TOLERABLE_FAILURE, failure};
+use super::{DEFAULT_MAX_ATTEMPTS, Intensity, Luminance, Proposal, Recipe, RecipeError};
+use crate::colorimetry;
+use crate::condition::Condition;
+use crate::cover::Cover;
+use crate::cpu::Kernel;
+use crate::dataset::Kind;
+use crate::model::Model;
+use crate::outputs::{Asked, outputs};
+use crate::program::{self, Affine, Bounds, Level, Program, Target};
+use crate::quantity::{Element, Layout, Quantity};
+use crate::region::{self, Room};
+use crate::stream::Stream;
+
+/// How many candidates estimate the acceptance before any work starts.
+pub(super) const PILOT: u64 = 1 << 16;
+
+/// A recipe under construction.
+#[derive(Clone, Debug)]
+pub struct RecipeBuilder {
+    model: Model,
+    lrv: Option<f64>,
+    xyz: Option<[f64; 3]>,
+    bounds: Bounds,
+    covariance_scale: f64,
+    intensity: Option<Intensity>,
+    proposal: Proposal,
+    max_attempts: u32,
+    outputs: Asked,
+}
+
+impl RecipeBuilder {
+    pub(super) fn new(model: &Model) -> RecipeBuilder {
+        RecipeBuilder {
+            model: model.clone(),
+            lrv: None,
+            xyz: None,
+            bounds: Bounds::default(),
+            covariance_scale: 1.0,
+            intensity: None,
+            proposal: Proposal::default(),
+            max_attempts: DEFAULT_MAX_ATTEMPTS,
+            outputs: Asked::default(),
+        }
+    }
+
+    /// What comes out, besides nothing: unless said, [`Quantity::Spectra`]. Engines add [`Quantity::Attempts`].
+    pub fn quantities(mut self, quantities: impl IntoIterator<Item = Quantity>) -> Self {
+        self.outputs.quantities = quantities.into_iter().collect();
+        self
+    }
+
+    /// How quantities with several values a draw are ordered ([`Layout::Rows`]).
+    pub fn layout(mut self, layout: Layout) -> Self {
+        self.outputs.layout = layout;
+        self
+    }
+
+    /// Spectra in 16 bits, rounded to nearest and ties to even; other quantities stay in 32.
+    pub fn half_spectra(mut self) -> Self {
+        self.outputs.spectra = Element::F16;
+        self
+    }
+
+    /// The illuminant under which reflectances have their XYZ and sRGB (D65): its power in each band, in any unit.
+    pub fn light(mut self, power: &[f64]) -> Self {
+        self.outputs.light = Some(power.to_vec());
+        self
+    }
+
+    /// The scale of an illuminant's XYZ and sRGB ([`Luminance::Absolute`]).
+    pub fn luminance(mut self, luminance: Luminance) -> Self {
+        self.outputs.luminance = luminance;
+        self
+    }
+
+    /// Multiplies illuminants.
+    pub fn intensity(self, intensity: Intensity) -> Self {
+        RecipeBuilder { intensity: Some(intensity), ..self }
+    }
+
+    /// Scales every draw to a luminous reflectance value (LRV, 0 to 1), eq. 9 and 10.
+    pub fn lrv(self, lrv: f64) -> Self {
+        RecipeBuilder { lrv: Some(lrv), ..self }
+    }
+
+    /// Gives every draw these tristimulus values under D65, where a perfect white has Y = 1: draws of the model's
+    /// Gaussian conditioned on them, of k - 3 dimensions, with the spectrum between 0 and 1. They are met to the
+    /// rounding of f32, within 1e-6.
+    ///
+    /// ```
+    /// use spectroll::{Model, Quantity, Recipe, Stream};
+    ///
+    /// let model = Model::builtin("munsell-vrhel")?;
+    /// let recipe = Recipe::new(&model).xyz([0.35, 0.3, 0.2]).quantities([Quantity::Xyz]).build()?;
+    /// let drawn = recipe.draw::<f32>(Stream::new(1), 0);
+    /// assert!((drawn.values(Quantity::Xyz)[0] - 0.35).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn xyz(self, xyz: [f64; 3]) -> Self {
+        RecipeBuilder { xyz: Some(xyz), ..self }
+    }
+
+    /// What must lie between 0 and 1 where there is a target LRV.
+    pub fn bounds(self, bounds: Bounds) -> Self {
+        RecipeBuilder { bounds, ..self }
+    }
+
+    /// Multiplies the weights' covariance.
+    pub fn covariance_scale(self, covariance_scale: f64) -> Self {
+        RecipeBuilder { covariance_scale, ..self }
+    }
+
+    /// Where candidates come from ([`Proposal::Auto`]).
+    pub fn proposal(self, proposal: Proposal) -> Self {
+        RecipeBuilder { proposal, ..self }
+    }
+
+    /// How many candidates a draw may take ([`DEFAULT_MAX_ATTEMPTS`]).
+    pub fn max_attempts(self, max_attempts: u32) -> Self {
+        RecipeBuilder { max_attempts, ..self }
+    }
+
+    /// The recipe, if it can be drawn: its values make sense, a linear program finds room for a spectrum, and a pilot
+    /// run finds enough of it.
+    pub fn build(self) -> Result<Recipe, RecipeError> {
+        if !(self.covariance_scale.is_finite() && self.covariance_scale >= 0.0) {
+            return Err(RecipeError::CovarianceScale(self.covariance_scale));
+        }
+        if self.max_attempts == 0 || self.max_attempts > i32::MAX as u32 {
+            return Err(RecipeError::MaxAttempts(self.max_attempts));
+        }
+        let target = self.lrv.map(|lrv| self.target(lrv)).transpose()?;
+        let mut weights = program::weights(&self.model, self.covariance_scale);
+        if let Some(xyz) = self.xyz {
+            weights = self.condition(&weights)?.given(xyz, &weights);
+        }
+        let mut program =
+            Program { target, max_attempts: self.max_attempts, ..Program::new(&self.model, &weights) };
+        let mut asked = self.outputs.clone();
+        if let Some(intensity) = self.intensity {
+            program = self.brighten(program, intensity)?;
+            asked.fixed = if let Intensity::Fixed(value) = intensity { Some(value) } else { None };
+        }
+        check_scale(&program)?;
+        program.outputs = outputs(&asked, &self.model, &program, &weights)?;
+        if let Some(target) = &program.target {
+            let largest = region::largest_lrv(&program, &target.weights);
+            if let Some(largest) = largest.filter(|&largest| target.lrv >= largest) {
+                return Err(RecipeError::UnreachableLrv { lrv: target.lrv, largest });
+            }
+        }
+        let half_spaces = region::half_spaces(&program);
+        let within = match region::room(&half_spaces) {
+            Room::None { bands } => {
+                if let Some(xyz) = self.xyz {
+                    return Err(RecipeError::UnreachableXyz { xyz, nearest: self.nearest(xyz) });
+                }
+                let wavelengths = bands.into_iter().map(|band| self.model.grid().wavelength(band)).collect();
+                return Err(RecipeError::Empty { wavelengths });
+            }
+            Room::Ball { centre, .. } => Some(centre),
+            Room::Unknown => None, // which the pilot run will tell
+        };
+        let plain = match self.proposal {
+            Proposal::Cover => 0.0,
+            Proposal::Auto | Proposal::Plain => pilot(&program),
+        };
+        let cover = match within {
+            Some(within) if self.proposal == Proposal::Cover || self.may_cover(plain) => {
+                Cover::new(&half_spaces, &within)
+            }
+            _ => None,
+        };
+        if self.proposal == Proposal::Cover && cover.is_none() {
+            return Err(RecipeError::NoCover { components: program.components() });
+        }
+        let covered = cover.map(|cover| (program.clone().covered(&cover), cover));
+        let covered = covered.map(|(program, cover)| (pilot(&program), program, cover));
+        let covered = covered.filter(|(acceptance, ..)| Cover::pays(*acceptance, plain));
+        let recipe = match covered {
+            Some((acceptance, program, cover)) => Recipe {
+                model: self.model,
+                program,
+                probability: acceptance * cover.mass(),
+                acceptance,
+                cover: Some((cover.len(), cover.proposal().bytes())),
+            },
+            None => Recipe { model: self.model, program, probability: plain, acceptance: plain, cover: None },
+        };
+        if failure(recipe.acceptance, self.max_attempts) > TOLERABLE_FAILURE {
+            let acceptance = recipe.acceptance;
+            return Err(RecipeError::Hopeless { acceptance, max_attempts: self.max_attempts });
+        }
+        Ok(recipe)
+    }
+
+    /// Whether a cover is to be tried.
+    fn may_cover(&self, plain: f64) -> bool {
+        self.proposal == Proposal::Auto && Cover::could_pay(plain)
+    }
+
+    /// What giving the tristimulus values does to this model.
+    pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
+        let [_, y, _] = self.xyz.unwrap_or([0.5; 3]);
+        if let Some(xyz) = self.xyz.filter(|xyz| !(xyz.iter().all(|v| v.is_finite()) && y > 0.0 && y < 1.0)) {
+            return Err(RecipeError::Xyz(xyz));
+        }
+        if self.model.kind() == Kind::Illuminant {
+            return Err(RecipeError::XyzOfIlluminant);
+        }
+        if self.lrv.is_some() {
+            return Err(RecipeError::XyzAndLrv);
+        }
+        let (_, xyz) = self.seen(weights)?;
+        Condition::new(&xyz).ok_or(RecipeError::TooFewDirections)
+    }
+
+    /// The program without a target, and the map of its tristimulus values under D65.
+    fn seen(&self, weights: &Affine) -> Result<(Program, Affine), RecipeError> {
+        let grid = self.model.grid();
+        let seen = colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+        let program = Program::new(&self.model, weights);
+        let xyz = program.spectrum.project(&seen);
+        Ok((program, xyz))
+    }
+
+    /// The nearest tristimulus values that can be drawn. The very nearest leave no room for a spectrum to vary in, so
+    /// these are a little of the way from there to those of the mean.
+    fn nearest(&self, xyz: [f64; 3]) -> Option<[f64; 3]> {
+        let weights = program::weights(&self.model, self.covariance_scale);
+        let (program, map) = self.seen(&weights).ok()?;
+        let nearest = region::nearest_xyz(&program, &map, xyz)?;
+        let steps = (0..16).map(|doublings| 1e-4 * f64::from(1 << doublings)).take_while(|&part| part < 1.0);
+        let inwards = |part| [0, 1, 2].map(|i| nearest[i] + part * (map.offset[i] - nearest[i]));
+        let rounded = steps.map(inwards).map(|xyz| xyz.map(|v| (v * 1e4).round() / 1e4));
+        let condition = self.condition(&weights).ok()?;
+        rounded.into_iter().find(|&xyz| {
+            let program = Program::new(&self.model, &condition.given(xyz, &weights));
+            !matches!(region::room(&region::half_spaces(&program)), Room::None { .. })
+                && failure(pilot(&program), self.max_attempts) <= TOLERABLE_FAILURE
+        })
+    }
+
+    fn brighten(&self, program: Program, intensity: Intensity) -> Result<Program, RecipeError> {
+        if self.model.kind() == Kind::Reflectance {
+            return Err(RecipeError::IntensityOfReflectance);
+        }
+        let check = |value: f64| match (1e-30..1e30).contains(&value) {
+            true => Ok(value),
+            false => Err(RecipeError::Intensity(value)),
+        };
+        let level = match intensity {
+            Intensity::Fixed(value) => return Ok(program.brightened(check(value)?)),
+            Intensity::LogUniform(low, high) => {
+                let octaves = (check(high)? / check(low)?).log2();
+                if !(octaves > 0.0 && octaves <= 126.0) {
+                    return Err(RecipeError::IntensityRange { low, high });
+                }
+                Level::LogUniform { low, octaves }
+            }
+            Intensity::Data => match self.model.parts().powers.as_slice() {
+                [] => return Err(RecipeError::NoPowers),
+                powers => Level::OneOf(powers.iter().map(|&p| check(p)).collect::<Result<_, _>>()?),
+            },
+        };
+        Ok(Program { level: Some(level), ..program })
+    }
+
+    fn target(&self, lrv: f64) -> Result<Target, RecipeError> {
+        // Far below, spectra would round to 0; just below 1, to 1.
+        if !(1e-30..1.0).contains(&f64::from(lrv as f32)) {
+            return Err(RecipeError::Lrv(lrv));
+        }
+        if self.model.kind() == Kind::Illuminant {
+            return Err(RecipeError::LrvOfIlluminant);
+        }
+        let grid = self.model.grid();
+        let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+        Ok(Target { lrv, weights, bounds: self.bounds })
+    }
+}
+
+/// Numbers must survive rounding to f32, with room for sums and for a scale of 10^6 either way; where there is a
+/// target, so must the LRV of dark candidates, by which all are divided. No band may be below f32's normal range, which
+/// adapters may flush to 0.
+fn check_scale(program: &Program) -> Result<(), RecipeError> {
+    let Affine { offset, gain } = &program.spectrum;
+    let size = |b: usize| gain.iter().fold(offset[b].abs(), |a, gain| a.max(gain[b].abs()));
+    let sizes = || (0..program.bands()).map(size);
+    let (least, largest) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
+    let low = if program.target.is_some() { 1e-20 } else { 1e-30 };
+    if !(low..1e30).contains(&largest) {
+        return Err(RecipeError::Scale(largest));
+    }
+    let is_lost = least > 0.0 && least < f64::from(f32::MIN_POSITIVE);
+    if is_lost { Err(RecipeError::Scale(least)) } else { Ok(()) }
+}
+
+/// The share of accepted candidates, of a stream of its own. In f32, as draws are made: what passes in f64 may have no
+/// room there.
+fn pilot(program: &Program) -> f64 {
+    let kernel = Kernel::<f32>::new(program);
+    let stream = Stream::named(0, "pilot");
+    let accepted = (0..PILOT).into_par_iter().filter(|&index| kernel.accepts(|b| stream.block(index, 0, b)));
+    accepted.count() as f64 / PILOT as f64
+}

@@ -1,0 +1,110 @@
+//! Why a recipe cannot be drawn.
+
+use super::builder::PILOT;
+use crate::grid::Grid;
+use crate::quantity::Quantity;
+
+/// The probability that a draw finds no candidate within its attempts, above which a recipe is refused: one failure
+/// in a data set of 10^12 draws.
+pub(super) const TOLERABLE_FAILURE: f64 = 1e-12;
+
+/// Why a recipe cannot be drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what the fields are
+pub enum RecipeError {
+    #[error(
+        "a target luminous reflectance of {0}: it must be above 0 and below 1, where 1 is a perfect white, and 1e-30 at least"
+    )]
+    Lrv(f64),
+    #[error("a target luminous reflectance belongs to reflectances, and this model is of illuminants")]
+    LrvOfIlluminant,
+    #[error("the grid {0} has no light that the eye sees, so nothing on it has a luminous reflectance")]
+    Invisible(Grid),
+    #[error("no reflectance of this model has a luminous reflectance of {lrv}: the largest is {largest:.6}")]
+    UnreachableLrv { lrv: f64, largest: f64 },
+    #[error("tristimulus values of {0:?}: they must be finite, and Y above 0 and below 1")]
+    Xyz([f64; 3]),
+    #[error("target tristimulus values belong to reflectances, and this model is of illuminants")]
+    XyzOfIlluminant,
+    #[error("target tristimulus values say what the luminous reflectance is: leave the target for it out")]
+    XyzAndLrv,
+    #[error(
+        "target tristimulus values take 3 of the directions in which a model varies, and it needs 4 or more: fit it \
+         with more components"
+    )]
+    TooFewDirections,
+    #[error("{}", unreachable_xyz(*xyz, *nearest))]
+    UnreachableXyz { xyz: [f64; 3], nearest: Option<[f64; 3]> },
+    #[error("an intensity of {0}: it must be above 0, finite and within what f32 holds")]
+    Intensity(f64),
+    #[error(
+        "an intensity between {low} and {high}: the first must be below the second, and no more than 2^126 below"
+    )]
+    IntensityRange { low: f64, high: f64 },
+    #[error("an intensity belongs to illuminants, and this model is of reflectances")]
+    IntensityOfReflectance,
+    #[error(
+        "this model does not hold what its data were divided by: fit it again, normalized, or give intensities"
+    )]
+    NoPowers,
+    #[error("{quantity} cannot come out: {reason}")]
+    Quantity { quantity: Quantity, reason: &'static str },
+    #[error("nothing is asked for: a recipe has at least one quantity")]
+    Nothing,
+    #[error("an illuminant of {found} values where the model has {expected} bands")]
+    Light { found: usize, expected: usize },
+    #[error(
+        "the illuminant that surfaces are seen under has no luminance, or a value that is negative or not finite"
+    )]
+    DarkLight,
+    #[error("a covariance scale of {0}: it must be finite and not negative")]
+    CovarianceScale(f64),
+    #[error("a draw needs at least 1 attempt and at most 2147483647, not {0}")]
+    MaxAttempts(u32),
+    #[error("the model's values reach {0:e}, beyond what f32 holds: fit it to rescaled or normalised data")]
+    Scale(f64),
+    #[error(
+        "no spectrum of this model obeys the rule: the bounds at {} leave no room",
+        nanometres(wavelengths)
+    )]
+    Empty { wavelengths: Vec<f64> },
+    #[error(
+        "what is acceptable cannot be covered: covers are for models of up to 12 components, and this one has {components}"
+    )]
+    NoCover { components: usize },
+    #[error("too few candidates would be accepted: {}", hopeless(*acceptance, *max_attempts))]
+    Hopeless { acceptance: f64, max_attempts: u32 },
+}
+
+/// The probability that none of `attempts` candidates is accepted.
+pub(super) fn failure(acceptance: f64, attempts: u32) -> f64 {
+    (f64::from(attempts) * (-acceptance).ln_1p()).exp()
+}
+
+fn hopeless(acceptance: f64, max_attempts: u32) -> String {
+    if acceptance == 0.0 {
+        return format!("none of {PILOT} was; ask for less extreme spectra");
+    }
+    let needed = (TOLERABLE_FAILURE.ln() / (-acceptance).ln_1p()).ceil();
+    format!(
+        "an estimated {acceptance:.1e} of them, so that one draw in {:.1e} would fail in all its {max_attempts} attempts; \
+         allow at least {needed:.0} attempts, or ask for less extreme spectra",
+        1.0 / failure(acceptance, max_attempts)
+    )
+}
+
+fn unreachable_xyz(xyz: [f64; 3], nearest: Option<[f64; 3]>) -> String {
+    let nearest = match nearest {
+        Some([x, y, z]) => format!(
+            "the nearest that can be drawn are X = {x}, Y = {y}, Z = {z} (by the largest of the differences)"
+        ),
+        None => "nor are any near them that can be drawn".to_owned(),
+    };
+    let [x, y, z] = xyz;
+    format!("no reflectance of this model has the tristimulus values X = {x}, Y = {y}, Z = {z}: {nearest}")
+}
+
+fn nanometres(wavelengths: &[f64]) -> String {
+    wavelengths.iter().map(|w| format!("{w} nm")).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,287 @@
+//! A recipe: all that one group of draws needs besides its random words. Making one refuses what cannot be drawn,
+//! so that whoever holds a [`Recipe`] can.
+
+mod builder;
+mod error;
+
+pub use builder::RecipeBuilder;
+pub use error::RecipeError;
+
+use rand::Rng;
+use rand::distr::Distribution;
+
+use crate::colorimetry;
+use crate::cpu::Kernel;
+use crate::dataset::Kind;
+use crate::model::Model;
+use crate::normal::Real;
+use crate::program::{self, Program, Tally};
+use crate::quantity::{Format, Quantity};
+use crate::region;
+use crate::stream::Stream;
+use crate::wgsl::{self, TextError};
+
+/// How many candidates a draw may take unless asked otherwise.
+pub const DEFAULT_MAX_ATTEMPTS: u32 = 1 << 16;
+
+/// A model, and what its draws must obey. See [`Recipe::new`].
+#[derive(Clone, Debug)]
+pub struct Recipe {
+    model: Model,
+    program: Program,
+    probability: f64,
+    acceptance: f64,
+    /// How many boxes candidates are proposed from, and how many bytes their table has; `None` of plain rejection.
+    cover: Option<(usize, usize)>,
+}
+
+/// Where candidates come from. The draws have the same distribution either way, but are not the same draws.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Proposal {
+    /// Whatever is expected to cost less.
+    #[default]
+    Auto,
+    /// The model's Gaussian, as in the appendix: right where a good part of it is acceptable.
+    Plain,
+    /// Boxes that cover what is acceptable, for models of up to 12 components: right where next to nothing is.
+    Cover,
+}
+
+/// What an illuminant is multiplied by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Intensity {
+    /// This.
+    Fixed(f64),
+    /// Something between the two, uniform in its logarithm, for each draw.
+    LogUniform(f64, f64),
+    /// For each draw one of what the model's data were divided by before the fit, each as likely: their mean powers,
+    /// unless the fit says otherwise.
+    Data,
+}
+
+/// The scale of an illuminant's tristimulus values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Luminance {
+    /// Sums of power x colour matching function x step in nm, without the 683 lm/W of luminous units.
+    #[default]
+    Absolute,
+    /// Y = 1.
+    One,
+}
+
+impl Recipe {
+    /// Starts a recipe: draws of `model` that are physical, and nothing more. [`RecipeBuilder::build`] ends it.
+    ///
+    /// ```
+    /// use spectroll::{Bounds, Model, Recipe};
+    ///
+    /// let model = Model::builtin("munsell-vrhel")?;
+    /// let recipe = Recipe::new(&model).lrv(0.4).bounds(Bounds::Scaled).build()?;
+    /// assert!((recipe.acceptance() - 0.708).abs() < 0.01);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[allow(clippy::new_ret_no_self)] // an unchecked recipe cannot exist
+    pub fn new(model: &Model) -> RecipeBuilder {
+        RecipeBuilder::new(model)
+    }
+
+    /// The largest luminous reflectance that reflectances of a model can be scaled to and stay below 1, which none
+    /// quite reaches: from a linear program. `None` of illuminants, and of a grid without visible light.
+    pub fn largest_lrv(model: &Model) -> Option<f64> {
+        let weights = colorimetry::lrv_weights(model.grid()).filter(|_| model.kind() == Kind::Reflectance)?;
+        region::largest_lrv(&Program::new(model, &program::weights(model, 1.0)), &weights)
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The share of candidates that are accepted, estimated from 65,536 of them.
+    pub fn acceptance(&self) -> f64 {
+        self.acceptance
+    }
+
+    /// The probability that a spectrum of the model obeys the rule, which is the share that plain rejection accepts;
+    /// estimated from as many candidates.
+    pub fn probability(&self) -> f64 {
+        self.probability
+    }
+
+    /// Where candidates come from; never [`Proposal::Auto`].
+    pub fn proposal(&self) -> Proposal {
+        if self.cover.is_some() { Proposal::Cover } else { Proposal::Plain }
+    }
+
+    /// How many boxes candidates are proposed from, and how many bytes their table has, where there is a cover.
+    pub fn cover(&self) -> Option<(usize, usize)> {
+        self.cover
+    }
+
+    /// What comes out, and how it lies in memory, in the order of [`Quantity`].
+    pub fn formats(&self) -> Vec<Format> {
+        self.program.outputs.iter().map(|output| output.format).collect()
+    }
+
+    /// Draw `index` of a stream, on the CPU: in f32 as the shader makes it, in f64 without its rounding errors.
+    pub fn draw<R: Real>(&self, stream: Stream, index: u64) -> Drawn<R> {
+        let (values, tally) = Kernel::new(&self.program).draw(stream, index);
+        Drawn { tally, values: self.program.outputs.iter().map(|o| o.format.quantity).zip(values).collect() }
+    }
+
+    /// The draw as a WGSL module without bindings or entry points, for shaders of a host on any version of wgpu or any
+    /// other engine. Every name has `prefix` and an underscore before it, so that several recipes fit in one shader:
+    ///
+    /// - `PREFIX_draw(seed: vec2<u32>, index: vec2<u32>) -> PREFIX_Draw` makes the same draw as every engine. Its
+    ///   member `attempts` is how many candidates that took, 0 where it failed; the rest is for the functions below.
+    ///   `PREFIX_draw_in(stream, seed, index)` makes that of a [`Stream`] by its number.
+    /// - for spectra, `PREFIX_at(draw, band) -> f32` and `PREFIX_spectrum(draw) -> array<f32, bands>`;
+    /// - for weights, `PREFIX_weights(draw) -> array<f32, components>`;
+    /// - for XYZ and sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_srgb`;
+    /// - for LRV and intensity, `PREFIX_lrv(draw) -> f32` and `PREFIX_intensity`.
+    ///
+    /// The module needs no optional feature. To import it with `naga_oil`, put a line `#define_import_path NAME` before
+    /// it, as `spectroll shader --naga-oil` does.
+    ///
+    /// ```
+    /// use spectroll::{Model, Quantity, Recipe};
+    ///
+    /// let recipe = Recipe::new(&Model::builtin("granada")?).quantities([Quantity::Srgb]).build()?;
+    /// assert!(recipe.wgsl("lamp")?.contains("fn lamp_srgb(d: lamp_Draw) -> vec3<f32>"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn wgsl(&self, prefix: &str) -> Result<String, TextError> {
+        wgsl::module(&self.program, prefix)
+    }
+
+    pub(crate) fn program(&self) -> &Program {
+        &self.program
+    }
+}
+
+/// One draw. See [`Recipe::draw`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn<R> {
+    tally: Tally,
+    values: Vec<(Quantity, Vec<R>)>,
+}
+
+impl<R> Drawn<R> {
+    /// What it took.
+    pub fn tally(&self) -> Tally {
+        self.tally
+    }
+
+    /// The values of a quantity, all 0 where the draw failed. None for [`Quantity::Attempts`], which
+    /// [`Drawn::tally`] has, nor for what the recipe does not ask for.
+    pub fn values(&self, quantity: Quantity) -> &[R] {
+        self.values.iter().find(|(q, _)| *q == quantity).map_or(&[], |(_, values)| values)
+    }
+
+    /// The spectrum, a value for each band, if the recipe asks for it.
+    pub fn spectrum(&self) -> &[R] {
+        self.values(Quantity::Spectra)
+    }
+}
+
+/// Draws for code that lives in `rand`: the words come from any generator, two for each two normals, rather than from
+/// a counter; everything else is the same. A spectrum has a value for each band. See also [`Stream::rng`].
+///
+/// ```
+/// use rand::distr::Distribution;
+/// use spectroll::{Model, Recipe, Stream};
+///
+/// let recipe = Recipe::new(&Model::builtin("granada")?).build()?;
+/// let daylights: Vec<Vec<f32>> = recipe.sample_iter(Stream::new(7).rng()).take(3).collect();
+/// assert!(daylights.iter().flatten().all(|&power| power > 0.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+impl<R: Real> Distribution<Vec<R>> for Recipe {
+    fn sample<G: Rng + ?Sized>(&self, rng: &mut G) -> Vec<R> {
+        let kernel = Kernel::new(&self.program.spectra_alone());
+        // A recipe that could loop here for long could not be built.
+        loop {
+            if let Some(mut values) = kernel.candidate(|_| [(); 4].map(|()| rng.next_u32())) {
+                return values.swap_remove(0);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(recipe: RecipeBuilder) -> String {
+        recipe.build().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_says_why() {
+        let surface = Recipe::new(&Model::builtin("munsell-vrhel").unwrap());
+        let light = Recipe::new(&Model::builtin("granada").unwrap());
+        for (recipe, part) in [
+            (surface.clone().lrv(f64::NAN), "NaN: it must be above 0 and below 1"),
+            (surface.clone().lrv(0.0), "reflectance of 0:"),
+            (surface.clone().lrv(0.996), "the largest is 0.995928"),
+            (surface.clone().covariance_scale(f64::NAN), "finite and not negative"),
+            (surface.clone().max_attempts(0), "at least 1 attempt"),
+            (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
+            (surface.clone().covariance_scale(1e6).proposal(Proposal::Plain), "none of 65536 was"),
+            (surface.clone().covariance_scale(100.0).max_attempts(50), "allow at least"),
+            (light.clone().lrv(0.5), "of illuminants"),
+            (light.clone().xyz([0.3; 3]), "of illuminants"),
+            (surface.clone().xyz([0.3, 1.0, 0.3]), "Y above 0 and below 1"),
+            (surface.clone().xyz([0.3, f64::NAN, 0.3]), "must be finite"),
+            (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
+            (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
+        ] {
+            let text = message(recipe);
+            assert!(text.contains(part), "{text}");
+        }
+        // What the message advises is enough.
+        let advised = message(surface.clone().covariance_scale(100.0).max_attempts(50));
+        let attempts =
+            advised.split("allow at least ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!(surface.covariance_scale(100.0).max_attempts(attempts).build().is_ok());
+    }
+
+    #[test]
+    fn tristimulus_values_out_of_reach_come_with_the_nearest() {
+        let surface = Recipe::new(&Model::builtin("munsell-vrhel").unwrap());
+        for xyz in [[0.1, 0.4, 0.05], [0.9, 0.3, 0.1], [0.95, 0.99, 1.07], [0.01, 0.02, 0.6]] {
+            let error = surface.clone().xyz(xyz).build().unwrap_err();
+            let RecipeError::UnreachableXyz { nearest: Some(nearest), .. } = error else { panic!("{error}") };
+            assert!(error.to_string().contains(&format!("Y = {}, Z", nearest[1])), "{error}");
+            assert!(surface.clone().xyz(nearest).build().is_ok(), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_model_without_room_names_its_wavelengths() {
+        let mut parts = Model::builtin("munsell-vrhel").unwrap().parts().clone();
+        parts.mean[3] = 9.0;
+        parts.mean[4] = -9.0;
+        let text = message(Recipe::new(&Model::new(parts).unwrap()));
+        assert!(text.contains("the bounds at 430 nm, 440 nm leave no room"), "{text}");
+    }
+
+    #[test]
+    fn values_beyond_f32_are_refused() {
+        let mut parts = Model::builtin("granada").unwrap().parts().clone();
+        parts.mean *= 1e35;
+        assert!(message(Recipe::new(&Model::new(parts).unwrap())).contains("beyond what f32 holds"));
+    }
+
+    /// Frozen, so that a changed stream is a decision and not an accident.
+    #[test]
+    fn the_first_draw_stays_what_it_is() {
+        let recipe = Recipe::new(&Model::builtin("munsell-vrhel").unwrap()).build().unwrap();
+        let drawn = recipe.draw::<f32>(Stream::new(1), 0);
+        let (spectrum, tally) = (drawn.spectrum(), drawn.tally());
+        let ends = [spectrum[0], spectrum[15], spectrum[30]].map(f32::to_bits);
+        assert_eq!((ends, tally.attempts(), tally.above_one()), (FIRST, 1, false));
+    }
+
+    const FIRST: [u32; 3] = [1050670988, 1051942847, 1058168784];
+}
