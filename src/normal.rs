@@ -7,6 +7,9 @@
 //!
 //! The first word x is the uniform u = (x + 1/2) 2^-32 of the radius sqrt(-2 ln u), the second, y, the angle
 //! 2 pi (y + 1/2) 2^-32: neither end of either interval is ever reached.
+//!
+//! Over all 2^32 words (`make exhaustive`) the radius in f32 is off by at most 5.4e-7, and by 1.4e-7 of itself; a sine or
+//! cosine by 1.3e-7.
 
 use std::f32::consts::LN_2;
 use std::f64::consts::{SQRT_2, TAU};
@@ -182,9 +185,9 @@ mod tests {
     use super::*;
 
     /// What no word exceeds.
-    const RADIUS_ERROR: f64 = 5.5e-7;
-    const RADIUS_RELATIVE_ERROR: f64 = 2e-7;
-    const CIRCLE_ERROR: f64 = 1.5e-7;
+    const RADIUS_ERROR: f64 = 5.4e-7;
+    const RADIUS_RELATIVE_ERROR: f64 = 1.4e-7;
+    const CIRCLE_ERROR: f64 = 1.3e-7;
 
     /// Every 1,009th word and both ends of every power of two: 4.3 million.
     fn words() -> impl Iterator<Item = u32> {
@@ -193,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn the_radius_is_good_to_5_5e_7() {
+    fn the_radius_is_good_to_5_4e_7() {
         let (mut absolute, mut relative) = (0f64, 0f64);
         for x in words() {
             let (value, exact) = (f64::from(radius(x)), exact_radius(x));
@@ -205,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn the_circle_is_good_to_1_5e_7() {
+    fn the_circle_is_good_to_1_3e_7() {
         let mut largest = 0f64;
         for y in words() {
             let ([c, s], [exact_c, exact_s]) = (circle(y), exact_circle(y));
