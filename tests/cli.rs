@@ -204,6 +204,51 @@ fn help_ends_with_examples_that_work() {
 }
 
 #[test]
+fn scenes_are_drawn_planned_and_pictured() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let (text, _) = succeeds(folder.path(), "scene --example condition2");
+    fs::write(path("mine.toml"), text).unwrap();
+    let (plan, _) = succeeds(folder.path(), "scene mine.toml --dry-run --engine gpu");
+    for part in ["lights: 3 a scene, by kernel 1", "background: [999, 31]", "1 kernel compiled", "left out"] {
+        assert!(plan.contains(part), "{plan}");
+    }
+    for name in ["a.npz", "a.zarr", "a.h5", "a.mat", "a.parquet", "parts/ --format npy"] {
+        succeeds(folder.path(), &format!("scene mine.toml --scenes 10..14 -o {name} --engine cpu"));
+    }
+    succeeds(folder.path(), "scene mine.toml --scenes 0..3 --only target -o a.csv --engine cpu");
+    let csv = fs::read_to_string(path("a.csv")).unwrap();
+    assert!(csv.starts_with("target_0_400,target_0_410,") && csv.lines().count() == 4, "{csv}");
+    let (json, _) = succeeds(folder.path(), "scene mine.toml --scenes 0..5 -o b.npz --json --engine cpu");
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((json["draws"].as_u64(), json["kernels"].as_u64()), (Some(5 * 4 + 999), Some(0)));
+    succeeds(folder.path(), "scene mine.toml --preview a.png --engine cpu");
+    succeeds(folder.path(), "scene mine.toml --preview a.png --force --engine cpu");
+    for (arguments, code, message) in [
+        ("mine.toml", 2, "say where to with -o"),
+        ("mine.toml --only walls -o x.npz", 2, "there are lights, background, target"),
+        ("mine.toml --scenes 5..2000 -o x.npz", 2, "the file has 1000 scenes"),
+        ("mine.toml --scenes 5..1 -o x.npz", 2, "expected A..B"),
+        ("absent.toml -o x.npz", 2, "cannot read the scene file"),
+        ("--example condition9 -o x.npz", 2, "condition1, condition2, condition3"),
+        ("mine.toml --preview a.png", 1, "exists already"),
+    ] {
+        fails(folder.path(), &format!("scene {arguments}"), code, message);
+    }
+    // The group alone is what it is among the others, and dimensions have the names that xarray will show.
+    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    succeeds(folder.path(), "scene mine.toml --scenes 12..14 --only target -o t.npz --engine cpu");
+    let code = "import json, numpy as np; a, t = np.load('a.npz'), np.load('t.npz'); \
+                assert (a['target'][2:] == t['target']).all(); \
+                m = json.load(open('a.zarr/zarr.json'))['consolidated_metadata']['metadata']; \
+                assert m['lights']['dimension_names'] == ['scene', 'lights_number', 'wavelength'], m['lights']; \
+                b = np.fromfile('a.zarr/background/c.0.0', '<f4').reshape(999, 31); \
+                assert (b == a['background']).all() and (b == np.load('parts/background.npy')).all()";
+    let output = Command::new(python).args(["-c", code]).current_dir(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
 fn adapters_and_bench_speak_both_languages() {
     let folder = tempfile::tempdir().unwrap();
     let (text, _) = succeeds(folder.path(), "adapters");

@@ -202,10 +202,10 @@ impl Preview {
             .collect();
         border.push(border[0]);
         all.push(line(&border, "#c9cdd3", 1.2));
-        for wavelength in [460, 480, 500, 520, 540, 560, 580, 600, 620] {
+        for wavelength in [460, 480, 520, 540, 560, 580, 600, 620] {
             let (x, y) = border[wavelength - 400];
             let (dx, anchor) =
-                if wavelength <= 510 { (-6.0, TextAnchor::End) } else { (6.0, TextAnchor::Start) };
+                if wavelength < 500 { (-6.0, TextAnchor::End) } else { (6.0, TextAnchor::Start) };
             all.push(label((x + dx, y + 1.0), 10, &wavelength.to_string(), anchor, "#9aa1ab"));
         }
         let corners = [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.64, 0.33)].map(|(x, y)| at(x, y));

@@ -24,7 +24,8 @@ use super::{EngineArguments, Usage, check_interrupt, existing, grouped, request,
 /// An element of a group depends on the seed, the group's name, the scene and the element alone: groups may be added,
 /// removed and moved, and any scene drawn alone.
 #[derive(clap::Args)]
-#[command(mut_arg("output", |output| output.required(false)))] // a picture or a dry run will do
+// A picture or a dry run will do without an output, which is then empty.
+#[command(mut_arg("output", |output| output.required(false).default_value("").hide_default_value(true)))]
 pub(crate) struct Arguments {
     /// The scene file, in TOML
     #[arg(value_name = "FILE", required_unless_present = "example", conflicts_with = "example")]
@@ -39,7 +40,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "A..B", value_parser = range)]
     scenes: Option<Range<u64>>,
     #[command(flatten)]
-    output: Option<OutputArguments>,
+    output: OutputArguments,
     /// Draw a picture of some scenes, .png or .svg
     #[arg(long, value_name = "OUT.png")]
     preview: Option<PathBuf>,
@@ -76,7 +77,9 @@ struct Report {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (name, text) = source(arguments)?;
-    let idle = arguments.output.is_none() && arguments.preview.is_none() && !arguments.dry_run;
+    let output = &arguments.output;
+    let to_somewhere = !output.output.as_os_str().is_empty();
+    let idle = !to_somewhere && arguments.preview.is_none() && !arguments.dry_run;
     if idle && arguments.example.is_some() {
         return Ok(io::stdout().write_all(text.as_bytes())?);
     }
@@ -105,13 +108,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     if let Some(path) = &arguments.preview {
         let format = picture::Format::of(path)?;
-        let force = arguments.output.as_ref().is_some_and(|output| output.force);
-        Preview::new(&scene, &engine, &job.scenes)?.write(path, format, existing(force))?;
+        Preview::new(&scene, &engine, &job.scenes)?.write(path, format, existing(output.force))?;
     }
-    match &arguments.output {
-        Some(output) => job.run(output),
-        None => Ok(()),
-    }
+    if to_somewhere { job.run() } else { Ok(()) }
 }
 
 /// The name and the text of the scene file.
@@ -152,14 +151,15 @@ impl Job<'_> {
         self.scenes.end - self.scenes.start
     }
 
-    fn run(&self, output: &OutputArguments) -> anyhow::Result<()> {
+    fn run(&self) -> anyhow::Result<()> {
+        let output = &self.arguments.output;
         if self.arguments.json && output.to_stdout() {
             return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
         }
         let target = output.target()?;
         let start = Instant::now();
         let mut drawer = self.scene.drawer(self.engine)?;
-        let mut writer = Columns::new(self, output, target, &drawer);
+        let mut writer = Columns::new(self, target, &drawer);
         output.check(target, &writer.schema)?;
         let is_set = matches!(target, Target::Set(_));
         if is_set {
@@ -186,7 +186,7 @@ impl Job<'_> {
         }) {
             Ok(drawn) => {
                 let outcome = sink.finish()?;
-                self.report(output, drawn, outcome, start.elapsed().as_secs_f64())
+                self.report(drawn, outcome, start.elapsed().as_secs_f64())
             }
             Err(error) => Err(sink.stop(error)),
         }
@@ -201,8 +201,7 @@ impl Job<'_> {
     ) -> anyhow::Result<Vec<GroupSummary>> {
         let missing = sink.missing(self.count());
         let count: u64 = missing.iter().map(|part| part.end - part.start).sum();
-        let output = self.arguments.output.as_ref().expect("there is one");
-        let progress = Progress::new(count, self.arguments.quiet, output.to_stdout());
+        let progress = Progress::new(count, self.arguments.quiet, self.arguments.output.to_stdout());
         let mut drawn = drawer.taken_once();
         let made = missing.into_iter().try_for_each(|part| {
             let scenes = self.scenes.start + part.start..self.scenes.start + part.end;
@@ -223,15 +222,9 @@ impl Job<'_> {
         made.map(|()| drawn)
     }
 
-    fn report(
-        &self,
-        output: &OutputArguments,
-        drawn: Vec<GroupSummary>,
-        outcome: Outcome,
-        seconds: f64,
-    ) -> anyhow::Result<()> {
+    fn report(&self, drawn: Vec<GroupSummary>, outcome: Outcome, seconds: f64) -> anyhow::Result<()> {
         let report = Report {
-            output: Some(output.output.display().to_string()),
+            output: Some(self.arguments.output.output.display().to_string()),
             drawn,
             complete: outcome == Outcome::Sealed,
             seconds,
@@ -242,7 +235,7 @@ impl Job<'_> {
             writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
         } else if !self.arguments.quiet {
             let (count, bands) = (grouped(self.count()), self.scene.grid().len());
-            eprintln!("{}: {count} scenes of {bands} bands", output.output.display());
+            eprintln!("{}: {count} scenes of {bands} bands", self.arguments.output.output.display());
             for GroupSummary { group, summary } in &report.drawn {
                 let accepted = summary.acceptance().map_or_else(String::new, |share| {
                     format!(", {} candidates ({:.2} % accepted)", grouped(summary.attempts), 100.0 * share)
@@ -322,7 +315,8 @@ impl Job<'_> {
             grouped(outline.draws),
             size(outline.bytes)
         )?;
-        if let Some(output) = self.arguments.output.as_ref().filter(|output| !output.to_stdout()) {
+        let output = &self.arguments.output;
+        if !output.to_stdout() && !output.output.as_os_str().is_empty() {
             writeln!(out, "  {}", room(&output.output, outline.bytes)?)?;
         }
         Ok(())
@@ -354,7 +348,8 @@ struct Columns {
 }
 
 impl Columns {
-    fn new(job: &Job, output: &OutputArguments, target: Target, drawer: &SceneDrawer) -> Columns {
+    fn new(job: &Job, target: Target, drawer: &SceneDrawer) -> Columns {
+        let stored = job.arguments.output.element();
         let shares = !matches!(
             target,
             Target::Stdout
@@ -363,7 +358,7 @@ impl Columns {
                 | Target::Set(Layout::Parquet)
         );
         let varying = job.scene.arrays().filter(|array| array.per_scene);
-        let mut fields: Vec<_> = varying.map(|array| field(array).stored_as(output.element())).collect();
+        let mut fields: Vec<_> = varying.map(|array| field(array).stored_as(stored)).collect();
         let (mut constants, mut repeated) = (Vec::new(), Vec::new());
         for (array, bytes) in drawer.constants() {
             if shares {
@@ -371,7 +366,7 @@ impl Columns {
                 let axes = axes(array).into_iter().zip(extents).collect();
                 constants.push(Constant { name: array.name.clone(), axes, element: element(array), bytes });
             } else {
-                fields.push(field(array).stored_as(output.element()));
+                fields.push(field(array).stored_as(stored));
                 repeated.push(bytes);
             }
         }
