@@ -86,7 +86,8 @@ impl Axis {
 
     /// What values are divided by to be plotted: kuva takes all below 1e-10 for that on a logarithmic axis.
     fn unit(&self) -> f64 {
-        if self.logarithmic && self.limits.0 < 1e-9 { round_down(self.limits.0) } else { 1.0 }
+        let decade = 10f64.powf(self.limits.0.log10().floor());
+        if self.logarithmic && decade < 1e-9 { decade } else { 1.0 }
     }
 }
 
