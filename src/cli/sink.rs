@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use spectroll::Element;
 use spectroll::output::{
     CsvWriter, FileWriter, Format, Layout, Outcome, OutputError, Plan, Schema, SetWriter, Shard, SpdFolder,
@@ -19,7 +20,8 @@ use super::{Interrupted, Usage, count, existing};
 pub(super) struct OutputArguments {
     /// Where to: .npy, .npz, .csv, .h5, .mat (MATLAB v7.3), .parquet or .zarr; FOLDER/ with --format npy, parquet or
     /// spd; - is CSV on standard output
-    #[arg(short, long, value_name = "OUT")]
+    // The parser of paths would not take the empty one that stands for none in `scene`.
+    #[arg(short, long, value_name = "OUT", value_parser = OsStringValueParser::new().map(PathBuf::from))]
     pub(super) output: PathBuf,
     /// The format [default: what the name says]
     #[arg(long, value_enum)]
