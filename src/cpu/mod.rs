@@ -257,10 +257,11 @@ impl<R: Real> Kernel<R> {
             *s = self.spectrum.value(b, &candidates.normals);
             physical.include(s);
         }
-        let mut verdicts = Verdicts {
-            accepted: std::array::from_fn(|l| kept[l] & physical.is_within(l, self.limit)),
-            above_one: [false; L],
-        };
+        let mut verdicts = Verdicts { accepted: kept, above_one: [false; L] };
+        // A loop, as everywhere here: array::from_fn and map may stay calls, which no lane code survives.
+        for l in 0..L {
+            verdicts.accepted[l] &= physical.is_within(l, self.limit);
+        }
         if let Some(target) = &self.target {
             candidates.scale = target.factor(&candidates.spectrum);
             for l in 0..L {
@@ -325,7 +326,10 @@ impl<R: Real> Target<R> {
                 lrv[l] = if b == 0 { product } else { lrv[l] + product }; // in the order of the bands
             }
         }
-        lrv.map(|lrv| self.lrv / floored(lrv))
+        for lrv in &mut lrv {
+            *lrv = self.lrv / floored(*lrv);
+        }
+        lrv
     }
 }
 
