@@ -12,28 +12,39 @@ pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
 }
 
 /// The same for L counters under one key, word by word: each step is a loop over lanes, for the compiler to
-/// vectorise.
+/// vectorise. Words are kept in the low halves of 64 bits, as vector units multiply them; what the high halves hold
+/// counts for nothing, and is not cleared.
 #[inline(always)]
 pub(crate) fn philox_in_lanes<const L: usize>(counters: [[u32; L]; 4], key: [u32; 2]) -> [[u32; L]; 4] {
-    let mut c = counters;
-    for round in 0..ROUNDS {
-        let [k0, k1] = [0, 1].map(|i| key[i].wrapping_add(round.wrapping_mul(WEYL[i])));
-        let mut next = [[0; L]; 4];
+    let mut c = [[0; L]; 4];
+    for (wide, words) in c.iter_mut().zip(&counters) {
         for l in 0..L {
-            let [a, b] = [wide(MULTIPLIERS[0], c[0][l]), wide(MULTIPLIERS[1], c[2][l])];
-            next[0][l] = (b >> 32) as u32 ^ c[1][l] ^ k0;
-            next[1][l] = b as u32;
-            next[2][l] = (a >> 32) as u32 ^ c[3][l] ^ k1;
-            next[3][l] = a as u32;
+            wide[l] = u64::from(words[l]);
         }
-        c = next;
     }
-    c
+    for round in 0..ROUNDS {
+        let [k0, k1] = [0, 1].map(|i| u64::from(key[i].wrapping_add(round.wrapping_mul(WEYL[i]))));
+        for l in 0..L {
+            let [a, b] = [product(MULTIPLIERS[0], c[0][l]), product(MULTIPLIERS[1], c[2][l])];
+            c[0][l] = (b >> 32) ^ c[1][l] ^ k0;
+            c[1][l] = b;
+            c[2][l] = (a >> 32) ^ c[3][l] ^ k1;
+            c[3][l] = a;
+        }
+    }
+    let mut words = [[0; L]; 4];
+    for (words, wide) in words.iter_mut().zip(&c) {
+        for l in 0..L {
+            words[l] = wide[l] as u32;
+        }
+    }
+    words
 }
 
+/// That of the low halves.
 #[inline(always)]
-fn wide(a: u32, b: u32) -> u64 {
-    u64::from(a) * u64::from(b)
+fn product(a: u32, b: u64) -> u64 {
+    u64::from(a) * u64::from(b as u32)
 }
 
 /// The known answers of the Random123 distribution (`kat_vectors`), counter, key and output: shared with the test of

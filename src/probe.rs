@@ -193,7 +193,7 @@ fn candidates_of_a_cover_are_those_of_their_twin() {
     let mut expected = Vec::new();
     for i in 0..COUNT {
         let mut coordinates = [[0f32]; 6];
-        let [kept] = proposal.propose(&mut coordinates, |b| stream.block(i, 3, b).map(|w| [w]));
+        let [kept] = proposal.propose(&mut coordinates, |b| stream.block(i, 3, b));
         expected.extend(coordinates.as_flattened());
         expected.push(f32::from(u8::from(kept)));
     }

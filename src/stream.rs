@@ -93,19 +93,8 @@ impl Stream {
     /// The four words of a block, below 256, of an attempt of draw `index`.
     pub fn block(&self, index: u64, attempt: u32, block: u32) -> [u32; 4] {
         assert!(block < 256, "block {block} would be one of another stream");
-        self.blocks(self.index_words(index).map(|word| [word]), [attempt], block).map(|[word]| word)
-    }
-
-    /// The same in L lanes: indices as [`Stream::index_words`], and an attempt for each.
-    #[inline(always)]
-    pub(crate) fn blocks<const L: usize>(
-        &self,
-        [low, high]: [[u32; L]; 2],
-        attempts: [u32; L],
-        block: u32,
-    ) -> [[u32; L]; 4] {
-        debug_assert!(block < 256);
-        philox_in_lanes([low, high, attempts, [self.id << 8 | block; L]], self.key())
+        let index = self.index_words(index).map(|word| [word]);
+        Attempts { stream: *self, index, attempts: [attempt] }.block(block).map(|[word]| word)
     }
 
     /// The draws of a range of indices, `0..1000` or `5..=u64::MAX`.
@@ -128,6 +117,38 @@ impl Stream {
     /// draw of the stream.
     pub fn rng(self) -> StreamRng {
         StreamRng { stream: self, next: 0, words: [0; 4], used: 4 }
+    }
+}
+
+/// Where the words of candidates come from, one in each of L lanes. A trait and not a closure, which could not be told to
+/// be inlined: what is not inlined is compiled for the least of all machines, and at a fraction of the speed.
+pub(crate) trait Blocks<const L: usize> {
+    /// The four words of a block, below 256.
+    fn block(&mut self, number: u32) -> [[u32; L]; 4];
+}
+
+/// In one lane speed is no matter, and words may come from anywhere.
+impl<F: FnMut(u32) -> [u32; 4]> Blocks<1> for F {
+    fn block(&mut self, number: u32) -> [[u32; 1]; 4] {
+        self(number).map(|word| [word])
+    }
+}
+
+/// Attempts at draws of a stream.
+#[derive(Clone, Copy)]
+pub(crate) struct Attempts<const L: usize> {
+    pub(crate) stream: Stream,
+    /// The draws, as [`Stream::index_words`] has them.
+    pub(crate) index: [[u32; L]; 2],
+    pub(crate) attempts: [u32; L],
+}
+
+impl<const L: usize> Blocks<L> for Attempts<L> {
+    #[inline(always)]
+    fn block(&mut self, number: u32) -> [[u32; L]; 4] {
+        debug_assert!(number < 256);
+        let [low, high] = self.index;
+        philox_in_lanes([low, high, self.attempts, [self.stream.id << 8 | number; L]], self.stream.key())
     }
 }
 

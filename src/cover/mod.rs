@@ -141,7 +141,7 @@ impl Cover {
     pub(crate) fn estimate(&self, stream: Stream, count: u64) -> Estimate {
         let mut coordinates = vec![[0.0]; self.proposal.components];
         let accepted = (0..count).filter(|&i| {
-            let words = |block| stream.block(i, 0, block).map(|word| [word]);
+            let words = |block| stream.block(i, 0, block);
             let [kept] = self.proposal.propose(&mut coordinates, words);
             kept && self.polytope.contains(coordinates.as_flattened())
         });

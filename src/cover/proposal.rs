@@ -4,6 +4,7 @@
 
 use super::alias::Alias;
 use crate::normal::Real;
+use crate::stream::Blocks;
 
 /// The boxes, as a draw uses them.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,16 +57,16 @@ impl<R: Real> Proposal<R> {
         (self.components as u32 + 2).div_ceil(4)
     }
 
-    /// Proposes a candidate in each of L lanes, of the words that `block` gives: `coordinates` are those of the
+    /// Proposes a candidate in each of L lanes, of the words of `from`: `coordinates` are those of the
     /// frame relative to its centre, k of them, and what is returned is whether thinning keeps them.
     #[inline(always)]
     pub(crate) fn propose<const L: usize>(
         &self,
         coordinates: &mut [[R; L]],
-        mut block: impl FnMut(u32) -> [[u32; L]; 4],
+        mut from: impl Blocks<L>,
     ) -> [bool; L] {
         let k = self.components;
-        let mut words = block(0);
+        let mut words = from.block(0);
         let (mut boxes, mut cost) = ([0; L], [R::ZERO; L]);
         for l in 0..L {
             boxes[l] = self.alias.choose(words[0][l]) as usize;
@@ -74,7 +75,7 @@ impl<R: Real> Proposal<R> {
         for (j, coordinate) in coordinates[..k].iter_mut().enumerate() {
             let word = (j + 1) % 4;
             if word == 0 {
-                words = block((j as u32 + 1) / 4);
+                words = from.block((j as u32 + 1) / 4);
             }
             let axes = self.axes_in_lanes(&boxes, j);
             for l in 0..L {
@@ -86,7 +87,7 @@ impl<R: Real> Proposal<R> {
         }
         let word = (k + 1) % 4;
         if word == 0 {
-            words = block((k as u32 + 1) / 4);
+            words = from.block((k as u32 + 1) / 4);
         }
         let mut kept = [false; L];
         for l in 0..L {

@@ -99,7 +99,7 @@ fn flips(program: &Program, cover: &Cover, count: u64) -> u64 {
     let (exact, rounded) = (cover.proposal(), cover.proposal().rounded::<f32>());
     let (mut d, mut r) = (vec![[0.0f64]; 6], vec![[0.0f32]; 6]);
     let flipped = (0..count).filter(|&i| {
-        let words = |block| Stream::new(3).block(i, 0, block).map(|w| [w]);
+        let words = |block| Stream::new(3).block(i, 0, block);
         let [kept] = exact.propose(&mut d, words);
         let [kept_rounded] = rounded.propose(&mut r, words);
         let judged = kept && is_physical(&program, d.as_flattened());
@@ -127,7 +127,7 @@ type Points = Vec<Vec<f64>>;
 fn accepted(cover: &Cover, proposal: &Proposal<f64>, candidates: u64) -> Points {
     let mut d = vec![[0.0]; proposal.components];
     let points = (0..candidates).filter_map(|i| {
-        let [kept] = proposal.propose(&mut d, |block| Stream::new(4).block(i, 0, block).map(|w| [w]));
+        let [kept] = proposal.propose(&mut d, |block| Stream::new(4).block(i, 0, block));
         let point = d.as_flattened();
         (kept && cover.polytope.contains(point)).then(|| point.to_vec())
     });

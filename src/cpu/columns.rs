@@ -6,6 +6,7 @@ use half::slice::HalfFloatSliceExt;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use super::lanes::Done;
 use super::{Candidates, Kernel, Take, Value};
 use crate::program::Tally;
 use crate::quantity::{Element, Format, Layout};
@@ -67,81 +68,99 @@ fn fill_chunk(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
 #[inline(always)]
 fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
     let widest = kernel.outputs.iter().map(|output| output.format.width).max().unwrap_or(0);
-    kernel.in_lanes::<L>(draws, &mut Filling { kernel, columns, row: vec![0.0; widest] });
+    let row = vec![0.0; widest.next_multiple_of(8)];
+    let halves = vec![f16::ZERO; row.len()];
+    kernel.in_lanes::<L>(draws, &mut Filling { kernel, columns, row, halves });
 }
 
 /// The columns that draws go into.
 struct Filling<'a> {
     kernel: &'a Kernel<f32>,
     columns: Vec<Column<'a>>,
-    /// Room for what is not stored as it is.
+    /// Room for a row that is not stored as it is, in whole eights: there are instructions that round eight at once.
     row: Vec<f32>,
+    halves: Vec<f16>,
 }
 
 impl<const L: usize> Take<f32, L> for Filling<'_> {
     #[inline(always)]
-    fn take(&mut self, number: usize, lane: usize, candidates: &Candidates<f32, L>, tally: Tally) {
+    fn take(&mut self, done: &[Done], candidates: &Candidates<f32, L>) {
         for ((output, column), maps) in
             self.kernel.outputs.iter().zip(&mut self.columns).zip(&candidates.maps)
         {
             let values = match output.value {
                 Value::Tally => {
-                    column.planes[0][number] = bytemuck::cast(tally);
+                    for done in done {
+                        column.planes[0][done.number] = bytemuck::cast(done.tally);
+                    }
                     continue;
                 }
                 Value::Spectrum => &candidates.spectrum,
                 Value::Map(..) => maps,
                 Value::Level => std::slice::from_ref(&candidates.scale),
             };
-            column.put(number, values, lane, tally, &mut self.row);
+            column.put(&values[..output.format.width], done, &mut self.row, &mut self.halves);
         }
     }
 }
 
 impl Column<'_> {
-    /// Stores the values of a lane, zeros where the draw failed. `row` is for what is not stored as it is.
-    #[inline(always)]
+    /// Stores the values of draws, zeros where one failed. `row` and `halves` are those of [`Filling`].
     fn put<const L: usize>(
         &mut self,
-        number: usize,
         values: &[[f32; L]],
-        lane: usize,
-        tally: Tally,
+        done: &[Done],
         row: &mut [f32],
+        halves: &mut [f16],
     ) {
         let (stride, width) = (self.format.stride(), self.format.width);
-        if self.format.layout != Layout::Planes && self.format.element == Element::F32 {
-            let row = cast_slice_mut(&mut self.planes[0][number * stride..][..width]);
-            return gather(values, lane, tally, row);
-        }
-        let row = &mut row[..width];
-        gather(values, lane, tally, row);
         match (self.format.layout, self.format.element) {
             (Layout::Planes, Element::F16) => {
-                for (plane, &value) in self.planes.iter_mut().zip(&*row) {
-                    cast_slice_mut::<_, f16>(plane)[number] = f16::from_f32(value);
+                for done in done {
+                    let row = &mut row[..width];
+                    copy(values, done, row);
+                    for (plane, &value) in self.planes.iter_mut().zip(&*row) {
+                        cast_slice_mut::<_, f16>(plane)[done.number] = f16::from_f32(value);
+                    }
                 }
             }
             (Layout::Planes, _) => {
-                for (plane, value) in self.planes.iter_mut().zip(&*row) {
-                    plane[number] = value.to_bits();
+                for done in done {
+                    let row = &mut row[..width];
+                    copy(values, done, row);
+                    for (plane, value) in self.planes.iter_mut().zip(&*row) {
+                        plane[done.number] = value.to_bits();
+                    }
+                }
+            }
+            (_, Element::F16) => {
+                let rows = cast_slice_mut::<_, f16>(self.planes[0]);
+                let eights = width.next_multiple_of(8);
+                for done in done {
+                    copy(values, done, &mut row[..width]);
+                    halves[..eights].convert_from_f32_slice(&row[..eights]);
+                    rows[done.number * stride..][..width].copy_from_slice(&halves[..width]);
                 }
             }
             _ => {
-                let halves = cast_slice_mut::<_, f16>(self.planes[0]);
-                halves[number * stride..][..width].convert_from_f32_slice(row);
+                let rows = cast_slice_mut(self.planes[0]);
+                for done in done {
+                    copy(values, done, &mut rows[done.number * stride..][..width]);
+                }
             }
         }
     }
 }
 
-/// Copies the values of a lane. By fours, and not inlined: with AVX-512 LLVM would make gathers of it, at several
+/// Copies the values of a draw. By fours, and not inlined: with AVX-512 LLVM would make gathers of it, at several
 /// times the cost of plain loads.
 #[inline(never)]
-fn gather<const L: usize>(values: &[[f32; L]], lane: usize, tally: Tally, row: &mut [f32]) {
-    if tally == Tally::FAILED {
+fn copy<const L: usize>(values: &[[f32; L]], done: &Done, row: &mut [f32]) {
+    if done.tally == Tally::FAILED {
         return row.fill(0.0);
     }
+    let lane = done.lane;
+    assert!(lane < L);
     let (from, from_rest) = values.as_chunks::<4>();
     let (to, to_rest) = row.as_chunks_mut::<4>();
     for (to, from) in to.iter_mut().zip(from) {

@@ -10,8 +10,11 @@
 //! fused, so all of them give the same bytes.
 
 mod columns;
+mod lanes;
 
 pub(crate) use columns::fill;
+
+use lanes::{Done, Lanes};
 
 use crate::cover::Proposal;
 use crate::dataset::Kind;
@@ -19,7 +22,7 @@ use crate::level::{self, Level};
 use crate::normal::Real;
 use crate::program::{self, Affine, Program, Source, Tally};
 use crate::quantity::Format;
-use crate::stream::{Draws, Stream};
+use crate::stream::{Attempts, Blocks, Draws, Stream};
 
 /// A [`Program`] with its numbers rounded to `R`.
 pub(crate) struct Kernel<R> {
@@ -37,11 +40,13 @@ pub(crate) struct Kernel<R> {
     outputs: Vec<Output<R>>,
 }
 
-/// An [`Affine`] map of the normals, value by value.
+/// An [`Affine`] map of the normals, by four values: so many sums at once keep a core busy, and share what is read of
+/// the normals. The last value fills the last four up, so that it is no special case.
 struct Map<R> {
-    offset: Vec<R>,
-    /// k gains for each value.
-    gain: Vec<R>,
+    values: usize,
+    offset: Vec<[R; 4]>,
+    /// k gains for each four values.
+    gain: Vec<[R; 4]>,
     components: usize,
 }
 
@@ -80,12 +85,9 @@ struct Candidates<R, const L: usize> {
     maps: Vec<Vec<[R; L]>>,
 }
 
-/// Where draws go. A trait and not a closure, which could not be told to be inlined: what is not inlined is compiled
-/// for the least of all machines.
+/// Where draws go. A trait and not a closure, for the reason of [`Blocks`].
 trait Take<R, const L: usize> {
-    /// Takes draw `number`, from the first on, which is in a lane of the candidates. Where it failed they are those of
-    /// its last attempt.
-    fn take(&mut self, number: usize, lane: usize, candidates: &Candidates<R, L>, tally: Tally);
+    fn take(&mut self, done: &[Done], candidates: &Candidates<R, L>);
 }
 
 /// What candidates came to, a lane each.
@@ -133,15 +135,15 @@ impl<R: Real> Kernel<R> {
     /// The number of bands.
     #[cfg(feature = "report")]
     pub(crate) fn bands(&self) -> usize {
-        self.spectrum.offset.len()
+        self.spectrum.values
     }
 
     /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
     pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, Tally) {
         struct Only<'a, R>(&'a Kernel<R>, Option<(Vec<Vec<R>>, Tally)>);
         impl<R: Real> Take<R, 1> for Only<'_, R> {
-            fn take(&mut self, _: usize, _: usize, candidates: &Candidates<R, 1>, tally: Tally) {
-                self.1 = Some((self.0.values(candidates, tally), tally));
+            fn take(&mut self, done: &[Done], candidates: &Candidates<R, 1>) {
+                self.1 = done.first().map(|done| (self.0.values(candidates, done.tally), done.tally));
             }
         }
         let mut only = Only(self, None);
@@ -153,7 +155,7 @@ impl<R: Real> Kernel<R> {
     /// rejected.
     pub(crate) fn candidate(&self, mut block: impl FnMut(u32) -> [u32; 4]) -> Option<Vec<Vec<R>>> {
         let mut candidates = self.candidates::<1>();
-        let kept = self.propose(&mut candidates, |b| block(b).map(|word| [word]));
+        let kept = self.propose(&mut candidates, &mut block);
         let word = self.level.as_ref().map(|_| [block(level::BLOCK)[0]]);
         let verdicts = self.judge(&mut candidates, kept, word);
         verdicts.accepted[0].then(|| self.values(&candidates, Tally::accepted(1, false)))
@@ -165,14 +167,14 @@ impl<R: Real> Kernel<R> {
     }
 
     fn values(&self, candidates: &Candidates<R, 1>, tally: Tally) -> Vec<Vec<R>> {
-        let first = |values: &[[R; 1]]| values.iter().map(|[value]| *value).collect();
+        let first = |values: &[[R; 1]], count| values[..count].iter().map(|[value]| *value).collect();
         let zero_where_failed = |values: Vec<R>| match tally {
             Tally::FAILED => vec![R::ZERO; values.len()],
             _ => values,
         };
         let values = self.outputs.iter().zip(&candidates.maps).map(|(output, maps)| match output.value {
-            Value::Spectrum => first(&candidates.spectrum),
-            Value::Map(..) => first(maps),
+            Value::Spectrum => first(&candidates.spectrum, self.spectrum.values),
+            Value::Map(ref map, _) => first(maps, map.values),
             Value::Level => vec![candidates.scale[0]],
             Value::Tally => Vec::new(),
         });
@@ -183,61 +185,39 @@ impl<R: Real> Kernel<R> {
     #[inline(always)]
     fn in_lanes<const L: usize>(&self, draws: Draws, to: &mut impl Take<R, L>) {
         let mut candidates = self.candidates::<L>();
-        let mut numbers = 0..draws.count as usize;
-        let mut lanes: [_; L] = std::array::from_fn(|_| numbers.next());
-        // A lane without a draw goes on with the first, to no effect.
-        let words = |lane: Option<usize>| {
-            draws.stream.index_words(draws.first.wrapping_add(lane.unwrap_or(0) as u64))
-        };
-        let (mut low, mut high, mut attempts) = ([0; L], [0; L], [0; L]);
-        for l in 0..L {
-            [low[l], high[l]] = words(lanes[l]);
-        }
-        while lanes.iter().any(Option::is_some) {
-            let index = [low, high];
-            let kept = self.propose(&mut candidates, |b| draws.stream.blocks(index, attempts, b));
-            let word = self.level.as_ref().map(|_| draws.stream.blocks(index, [0; L], level::BLOCK)[0]);
+        let mut lanes = Lanes::new(draws);
+        while lanes.are_busy() {
+            let words = lanes.words();
+            let kept = self.propose(&mut candidates, words);
+            let word = match self.level {
+                Some(_) => Some(Attempts { attempts: [0; L], ..words }.block(level::BLOCK)[0]),
+                None => None,
+            };
             let verdicts = self.judge(&mut candidates, kept, word);
-            for l in 0..L {
-                let Some(number) = lanes[l] else { continue };
-                attempts[l] += 1;
-                let tally = match verdicts.accepted[l] {
-                    true => Tally::accepted(attempts[l], verdicts.above_one[l]),
-                    false if attempts[l] == self.max_attempts => Tally::FAILED,
-                    false => continue,
-                };
-                to.take(number, l, &candidates, tally);
-                attempts[l] = 0;
-                lanes[l] = numbers.next();
-                [low[l], high[l]] = words(lanes[l]);
-            }
+            to.take(lanes.advance(&verdicts, self.max_attempts), &candidates);
         }
     }
 
     fn candidates<const L: usize>(&self) -> Candidates<R, L> {
         let maps = self.outputs.iter().map(|output| match &output.value {
-            Value::Map(map, _) => vec![[R::ZERO; L]; map.offset.len()],
+            Value::Map(map, _) => vec![[R::ZERO; L]; 4 * map.offset.len()],
             _ => Vec::new(),
         });
         Candidates {
             normals: vec![[R::ZERO; L]; self.spectrum.components.next_multiple_of(2)],
-            spectrum: vec![[R::ZERO; L]; self.spectrum.offset.len()],
+            spectrum: vec![[R::ZERO; L]; 4 * self.spectrum.offset.len()],
             scale: [R::ONE; L],
             maps: maps.collect(),
         }
     }
 
-    /// Proposes candidates, of the words that `block` gives for each block. Returns whether each is to be judged.
+    /// Proposes candidates, of the words of `from`. Returns whether each is to be judged.
     #[inline(always)]
-    fn propose<const L: usize>(
-        &self,
-        candidates: &mut Candidates<R, L>,
-        block: impl FnMut(u32) -> [[u32; L]; 4],
-    ) -> [bool; L] {
+    fn propose<const L: usize>(&self, candidates: &mut Candidates<R, L>, from: impl Blocks<L>) -> [bool; L] {
         match &self.proposal {
-            Some(proposal) => proposal.propose(&mut candidates.normals, block),
+            Some(proposal) => proposal.propose(&mut candidates.normals, from),
             None => {
-                make_normals(&mut candidates.normals, block);
+                make_normals(&mut candidates.normals, from);
                 [true; L]
             }
         }
@@ -252,11 +232,8 @@ impl<R: Real> Kernel<R> {
         kept: [bool; L],
         word: Option<[u32; L]>,
     ) -> Verdicts<L> {
-        let mut physical = Range::new();
-        for (b, s) in candidates.spectrum.iter_mut().enumerate() {
-            *s = self.spectrum.value(b, &candidates.normals);
-            physical.include(s);
-        }
+        self.spectrum.apply(&candidates.normals, &mut candidates.spectrum);
+        let physical = Range::of(&candidates.spectrum);
         let mut verdicts = Verdicts { accepted: kept, above_one: [false; L] };
         // A loop, as everywhere here: array::from_fn and map may stay calls, which no lane code survives.
         for l in 0..L {
@@ -270,21 +247,33 @@ impl<R: Real> Kernel<R> {
                 verdicts.above_one[l] = self.may_exceed_one && peak >= R::ONE;
             }
         } else if let Some((level, word)) = self.level.as_ref().zip(word) {
-            candidates.scale = word.map(|word| level.of(word));
+            for l in 0..L {
+                candidates.scale[l] = level.of(word[l]);
+            }
         }
         if self.scales_spectra {
-            candidates.spectrum.iter_mut().for_each(|s| multiply(s, &candidates.scale));
+            for s in &mut candidates.spectrum {
+                multiply(s, &candidates.scale);
+            }
         }
         for (output, values) in self.outputs.iter().zip(&mut candidates.maps) {
             let Value::Map(map, unit) = &output.value else { continue };
+            map.apply(&candidates.normals, values);
             let unit = match unit {
-                Unit::One => None,
-                Unit::Scale => Some(candidates.scale),
-                Unit::Over(over) => Some(over.value(0, &candidates.normals).map(|v| R::ONE / floored(v))),
+                Unit::One => continue,
+                Unit::Scale => candidates.scale,
+                Unit::Over(over) => {
+                    let mut values = [[R::ZERO; L]; 4];
+                    over.apply(&candidates.normals, &mut values);
+                    let [mut unit, ..] = values;
+                    for value in &mut unit {
+                        *value = R::ONE / floored(*value);
+                    }
+                    unit
+                }
             };
-            for (j, value) in values.iter_mut().enumerate() {
-                *value = map.value(j, &candidates.normals);
-                unit.iter().for_each(|unit| multiply(value, unit));
+            for value in values {
+                multiply(value, &unit);
             }
         }
         verdicts
@@ -293,25 +282,37 @@ impl<R: Real> Kernel<R> {
 
 impl<R: Real> Map<R> {
     fn new(map: &Affine) -> Map<R> {
-        let by_value = (0..map.offset.len()).flat_map(|j| map.gain.iter().map(move |gain| gain[j]));
-        Map {
-            offset: map.offset.iter().map(|&v| R::from_f64(v + 0.0)).collect(), // no -0: see `forms` of src/wgsl
-            gain: by_value.map(R::from_f64).collect(),
-            components: map.gain.len(),
-        }
+        let fours = |row: &[f64]| -> Vec<[R; 4]> {
+            let four = |values: &[f64]| {
+                // No -0: see `forms` of src/wgsl.
+                std::array::from_fn(|i| R::from_f64(values[i.min(values.len() - 1)] + 0.0))
+            };
+            row.chunks(4).map(four).collect()
+        };
+        let gains: Vec<_> = map.gain.iter().map(|row| fours(row)).collect();
+        let offset = fours(&map.offset);
+        let gain = (0..offset.len()).flat_map(|i| gains.iter().map(move |row| row[i])).collect();
+        Map { values: map.offset.len(), offset, gain, components: map.gain.len() }
     }
 
-    /// offset + gain . z of a value, in the order of the components.
+    /// offset + gain . z, each value in the order of the components. Four values are made for each begun four.
     #[inline(always)]
-    fn value<const L: usize>(&self, j: usize, normals: &[[R; L]]) -> [R; L] {
-        let gains = &self.gain[j * self.components..(j + 1) * self.components];
-        let mut sum = [self.offset[j]; L];
-        for (&gain, z) in gains.iter().zip(normals) {
-            for l in 0..L {
-                sum[l] = sum[l] + gain * z[l];
+    fn apply<const L: usize>(&self, normals: &[[R; L]], values: &mut [[R; L]]) {
+        let (fours, _) = values.as_chunks_mut::<4>();
+        for (i, (offset, values)) in self.offset.iter().zip(fours).enumerate() {
+            let mut sums = [[R::ZERO; L]; 4];
+            for (sum, &offset) in sums.iter_mut().zip(offset) {
+                *sum = [offset; L];
             }
+            for (gain, z) in self.gain[i * self.components..][..self.components].iter().zip(normals) {
+                for (sum, &gain) in sums.iter_mut().zip(gain) {
+                    for l in 0..L {
+                        sum[l] = sum[l] + gain * z[l];
+                    }
+                }
+            }
+            *values = sums;
         }
-        sum
     }
 }
 
@@ -344,6 +345,16 @@ fn floored<R: Real>(value: R) -> R {
 }
 
 #[inline(always)]
+fn least<R: Real>(a: R, b: R) -> R {
+    if b < a { b } else { a }
+}
+
+#[inline(always)]
+fn largest<R: Real>(a: R, b: R) -> R {
+    if b > a { b } else { a }
+}
+
+#[inline(always)]
 fn multiply<R: Real, const L: usize>(values: &mut [R; L], by: &[R; L]) {
     for l in 0..L {
         values[l] = values[l] * by[l];
@@ -357,33 +368,31 @@ struct Range<R, const L: usize> {
 }
 
 impl<R: Real, const L: usize> Range<R, L> {
-    fn new() -> Self {
-        Range { low: [R::INFINITY; L], high: [R::ZERO; L] }
-    }
-
+    /// That of values, four by four: a comparison waits for the last.
     #[inline(always)]
-    fn include(&mut self, values: &[R; L]) {
-        for (l, &value) in values.iter().enumerate() {
-            self.low[l] = if value < self.low[l] { value } else { self.low[l] };
-            self.high[l] = if value > self.high[l] { value } else { self.high[l] };
+    fn of(values: &[[R; L]]) -> Self {
+        let mut range = Range { low: [R::INFINITY; L], high: [R::ZERO; L] };
+        for [a, b, c, d] in values.as_chunks::<4>().0 {
+            for l in 0..L {
+                range.low[l] = least(range.low[l], least(least(a[l], b[l]), least(c[l], d[l])));
+                range.high[l] = largest(range.high[l], largest(largest(a[l], b[l]), largest(c[l], d[l])));
+            }
         }
+        range
     }
 
     /// Whether all values of a lane are positive and below `limit`.
     #[inline(always)]
     fn is_within(&self, lane: usize, limit: R) -> bool {
-        self.low[lane] > R::ZERO && self.high[lane] < limit
+        (self.low[lane] > R::ZERO) & (self.high[lane] < limit)
     }
 }
 
 /// The normals of the words of each block: four a block, two a pair of words.
 #[inline(always)]
-fn make_normals<R: Real, const L: usize>(
-    normals: &mut [[R; L]],
-    mut block: impl FnMut(u32) -> [[u32; L]; 4],
-) {
+fn make_normals<R: Real, const L: usize>(normals: &mut [[R; L]], mut from: impl Blocks<L>) {
     for (b, normals) in normals.chunks_mut(4).enumerate() {
-        let words = block(b as u32);
+        let words = from.block(b as u32);
         for (normals, words) in normals.chunks_exact_mut(2).zip(words.chunks_exact(2)) {
             for l in 0..L {
                 [normals[0][l], normals[1][l]] = R::normal_pair(words[0][l], words[1][l]);

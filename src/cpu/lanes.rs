@@ -1,0 +1,101 @@
+//! Which draw each lane works on, and which draws are done.
+
+use super::Verdicts;
+use crate::program::Tally;
+use crate::stream::{Attempts, Draws};
+
+/// A draw that is done, and the lane of the candidates that it is in. Where it failed they are those of its last
+/// attempt.
+#[derive(Clone, Copy)]
+pub(super) struct Done {
+    /// Its number, from the first that was asked for on.
+    pub(super) number: usize,
+    pub(super) lane: usize,
+    pub(super) tally: Tally,
+}
+
+/// Lanes that share the work on some draws: one that is done takes the next.
+pub(super) struct Lanes<const L: usize> {
+    draws: Draws,
+    /// The number of each lane's draw, from the first on.
+    numbers: [u64; L],
+    /// Its index, low words and high ones.
+    index: [[u32; L]; 2],
+    /// How many candidates were made for it.
+    attempts: [u32; L],
+    /// The number of the first draw that no lane has taken.
+    next: u64,
+    /// Which lanes have a draw, as bits. One that has none goes on with one beyond the last, to no effect.
+    busy: u64,
+    done: [Done; L],
+}
+
+impl<const L: usize> Lanes<L> {
+    #[inline(always)]
+    pub(super) fn new(draws: Draws) -> Self {
+        const { assert!(0 < L && L <= 64, "a lane is a bit of a word") };
+        let mut lanes = Lanes {
+            draws,
+            numbers: [0; L],
+            index: [[0; L]; 2],
+            attempts: [0; L],
+            next: 0,
+            busy: u64::MAX >> (64 - L),
+            done: [Done { number: 0, lane: 0, tally: Tally::FAILED }; L],
+        };
+        for lane in 0..L {
+            lanes.take_next(lane);
+        }
+        lanes
+    }
+
+    #[inline(always)]
+    pub(super) fn are_busy(&self) -> bool {
+        self.busy != 0
+    }
+
+    /// Where the words of the next candidates come from.
+    #[inline(always)]
+    pub(super) fn words(&self) -> Attempts<L> {
+        Attempts { stream: self.draws.stream, index: self.index, attempts: self.attempts }
+    }
+
+    /// Counts an attempt in each lane. Those whose candidate was accepted or was the last allowed are done, and go on
+    /// with other draws.
+    #[inline(always)]
+    pub(super) fn advance(&mut self, verdicts: &Verdicts<L>, max_attempts: u32) -> &[Done] {
+        // As bits: a branch for each lane would often be mispredicted.
+        let mut ended = 0;
+        for l in 0..L {
+            self.attempts[l] += 1;
+            ended |= u64::from(verdicts.accepted[l] | (self.attempts[l] == max_attempts)) << l;
+        }
+        ended &= self.busy;
+        let mut count = 0;
+        while ended != 0 {
+            let lane = ended.trailing_zeros() as usize;
+            ended &= ended - 1;
+            let tally = match verdicts.accepted[lane] {
+                true => Tally::accepted(self.attempts[lane], verdicts.above_one[lane]),
+                false => Tally::FAILED,
+            };
+            self.done[count] = Done { number: self.numbers[lane] as usize, lane, tally };
+            count += 1;
+            self.take_next(lane);
+        }
+        &self.done[..count]
+    }
+
+    #[inline(always)]
+    fn take_next(&mut self, lane: usize) {
+        if self.next >= self.draws.count {
+            self.busy &= !(1 << lane);
+        }
+        self.numbers[lane] = self.next;
+        self.attempts[lane] = 0;
+        let [low, high] = self.draws.stream.index_words(self.draws.first.wrapping_add(self.next));
+        self.index[0][lane] = low;
+        self.index[1][lane] = high;
+        self.next += 1;
+    }
+}
