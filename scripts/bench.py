@@ -85,7 +85,7 @@ def peers_model(folder):
 def in_process(rounds, model):
     rates = Figures()
     for _ in range(rounds):
-        for rate in json.loads(run(SPECTROLL, "bench", "--json", "--runs", "5")[0]):
+        for rate in json.loads(run(SPECTROLL, "bench", "--json", "--runs", "5")[0])["rates"]:
             rates.add(rate["engine"], rate["median"])
         if model:
             for peer in ("numpy", "numba"):

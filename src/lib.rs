@@ -40,6 +40,8 @@ pub mod output;
 pub mod provenance;
 
 #[cfg(feature = "report")]
+pub mod costs;
+#[cfg(feature = "report")]
 pub mod statistics;
 #[cfg(feature = "report")]
 pub mod stress;

@@ -8,7 +8,7 @@ use crate::program::Program;
 use crate::quantity::{Format, Quantity};
 use crate::recipe::Recipe;
 use crate::stream::Draws;
-use crate::wgsl::{self, COVER_AT, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Target};
+use crate::wgsl::{self, COVER_AT, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Tables, Target};
 
 /// A recipe's compute pipeline on a wgpu device, to be recorded into its host's command encoders.
 ///
@@ -81,8 +81,19 @@ impl Sampler {
 
     /// Compiles the shader of a program.
     pub(crate) fn of(device: &Device, program: &Program) -> Result<Sampler, SamplerError> {
-        let target = target(device);
+        let target = Sampler::target(device);
         let (text, tables) = wgsl::shader(program, target);
+        Sampler::with_text(device, program, target, text, &tables)
+    }
+
+    /// Compiles the shader that was written for a program, and puts the numbers that it reads into buffers.
+    pub(crate) fn with_text(
+        device: &Device,
+        program: &Program,
+        target: Target,
+        text: String,
+        tables: &Tables,
+    ) -> Result<Sampler, SamplerError> {
         let others = [!tables.values.is_empty(), program.proposal.is_some()];
         let buffers = (program.outputs.len() + others.into_iter().filter(|&there| there).count()) as u32;
         let largest = device.limits().max_storage_buffers_per_shader_stage;
@@ -117,6 +128,16 @@ impl Sampler {
             max_attempts: program.max_attempts,
             draws_per_thread: wgsl::draws_per_thread(program, target),
         })
+    }
+
+    /// The form of shader that suits a device.
+    pub(crate) fn target(device: &Device) -> Target {
+        let int64 = device.features().contains(wgpu::Features::SHADER_INT64);
+        match (int64, device.adapter_info().device_type) {
+            (false, _) => Target::Baseline,
+            (true, wgpu::DeviceType::Cpu) => Target::SoftwareInt64,
+            (true, _) => Target::Int64,
+        }
     }
 
     /// What comes out, in the order of [`Quantity`], and how it lies in its buffer.
@@ -251,16 +272,6 @@ impl Prepared {
     pub(crate) fn turn_to(&mut self, queue: &wgpu::Queue, draws: Draws) {
         self.count = draws.count;
         queue.write_buffer(&self.parameters, 0, bytemuck::bytes_of(&self.sampler.parameters(draws)));
-    }
-}
-
-/// The form of shader that suits a device.
-fn target(device: &Device) -> Target {
-    let int64 = device.features().contains(wgpu::Features::SHADER_INT64);
-    match (int64, device.adapter_info().device_type) {
-        (false, _) => Target::Baseline,
-        (true, wgpu::DeviceType::Cpu) => Target::SoftwareInt64,
-        (true, _) => Target::Int64,
     }
 }
 

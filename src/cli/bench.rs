@@ -4,9 +4,10 @@
 //! several runs is what to quote; their spread tells how quiet the machine was.
 
 use std::io::Write;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
+use spectroll::costs::{Costs, Share};
 use spectroll::{
     Bounds, Builtin, Choice, Dataset, Engine, Extend, Fit, Grid, Intensity, Kind, Layout, Model, Quantity,
     Recipe, RecipeBuilder, Stream, adapters,
@@ -39,6 +40,20 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+/// All that was measured.
+#[derive(Default, Serialize)]
+struct Measured {
+    rates: Vec<Rates>,
+    /// What each part of a draw costs, of each adapter.
+    shares: Vec<Shares>,
+}
+
+#[derive(Serialize)]
+struct Shares {
+    engine: String,
+    parts: Vec<Share>,
+}
+
 /// The rates of one engine, million draws a second.
 #[derive(Serialize)]
 struct Rates {
@@ -68,7 +83,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let seconds = if arguments.costs { SHORT_RUN } else { RUN };
     let width = recipes.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     watch_interrupts();
-    let mut all = Vec::new();
+    let mut all = Measured::default();
     for choice in choices {
         let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
         if arguments.costs && !arguments.json {
@@ -88,7 +103,24 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                     )?,
                 }
             }
-            all.push(rates);
+            all.rates.push(rates);
+        }
+        if arguments.costs
+            && let Some(parts) = parts(&engine, arguments.runs)?
+        {
+            if !arguments.json {
+                let mut out = std::io::stdout();
+                writeln!(
+                    out,
+                    "  without a part, where no candidate is rejected, a draw takes so much less time:"
+                )?;
+                for Share { part, median, least, most } in &parts {
+                    let [median, least, most] = [median, least, most].map(|share| 100.0 * share);
+                    let name = part.name();
+                    writeln!(out, "    {name:14}  {median:3.0} % ({least:.0} to {most:.0})")?;
+                }
+            }
+            all.shares.push(Shares { engine: engine.to_string(), parts });
         }
     }
     if arguments.json {
@@ -133,6 +165,19 @@ fn costs() -> anyhow::Result<Vec<(String, RecipeBuilder)>> {
     ]
     .map(|(name, builder)| (name.to_owned(), builder))
     .into())
+}
+
+/// What each part of a draw costs; nothing where that is not known.
+fn parts(engine: &Engine, runs: u32) -> anyhow::Result<Option<Vec<Share>>> {
+    let model = Model::builtin("munsell-vrhel")?;
+    let Some(mut costs) = Costs::new(engine, &model, Duration::from_secs_f64(SHORT_RUN))? else {
+        return Ok(None);
+    };
+    for _ in 0..runs {
+        check_interrupt()?;
+        costs.run()?;
+    }
+    Ok(Some(costs.shares()))
 }
 
 fn measure(engine: &Engine, name: &str, recipe: &Recipe, runs: u32, seconds: f64) -> anyhow::Result<Rates> {

@@ -74,11 +74,7 @@ impl Gpu {
         let mut waited = false;
         let mut poll = PollType::Poll;
         loop {
-            let polled = self.device.poll(poll);
-            if let Some(reason) = self.fault.lock().expect("no holder panics").clone() {
-                return Err(self.error(reason));
-            }
-            polled.map_err(|e| self.error(e.to_string()))?;
+            self.poll(poll)?;
             match flight.state() {
                 Some(Ok(())) => return Ok(waited),
                 Some(Err(e)) => return Err(self.error(e.to_string())),
@@ -86,6 +82,15 @@ impl Gpu {
             }
             poll = PollType::Wait { submission_index: Some(flight.submission.clone()), timeout: None };
         }
+    }
+
+    /// Polls the device, and tells what it reported.
+    pub(super) fn poll(&self, poll: PollType) -> Result<(), EngineError> {
+        let polled = self.device.poll(poll);
+        if let Some(reason) = self.fault.lock().expect("no holder panics").clone() {
+            return Err(self.error(reason));
+        }
+        polled.map(drop).map_err(|e| self.error(e.to_string()))
     }
 
     fn error(&self, reason: String) -> EngineError {

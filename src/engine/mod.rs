@@ -247,6 +247,15 @@ impl Engine {
         }
     }
 
+    /// Waits until the device has done what its queue was given.
+    #[cfg(feature = "report")]
+    pub(crate) fn wait(&self) -> Result<(), EngineError> {
+        match &self.device {
+            Device::Gpu(gpu) => gpu.poll(wgpu::PollType::wait_indefinitely()),
+            Device::Cpu(_) => Ok(()),
+        }
+    }
+
     /// Gets ready to draw from a recipe: what that takes (a compiled shader, buffers) is paid once, and serves any
     /// number of [`Drawer::draw`].
     pub fn drawer<'a>(&'a self, recipe: &'a Recipe) -> Result<Drawer<'a>, EngineError> {
