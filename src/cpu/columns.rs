@@ -85,30 +85,25 @@ struct Filling<'a> {
 impl<const L: usize> Take<f32, L> for Filling<'_> {
     #[inline(always)]
     fn take(&mut self, done: &[Done], candidates: &Candidates<f32, L>) {
-        for ((output, column), maps) in
-            self.kernel.outputs.iter().zip(&mut self.columns).zip(&candidates.maps)
-        {
-            let values = match output.value {
-                Value::Tally => {
-                    for done in done {
-                        column.planes[0][done.number] = bytemuck::cast(done.tally);
-                    }
-                    continue;
+        for (number, (output, column)) in self.kernel.outputs.iter().zip(&mut self.columns).enumerate() {
+            if let Value::Tally = output.value {
+                for done in done {
+                    column.planes[0][done.number] = bytemuck::cast(done.tally);
                 }
-                Value::Spectrum => &candidates.spectrum,
-                Value::Map(..) => maps,
-                Value::Level => std::slice::from_ref(&candidates.scale),
-            };
-            column.put(&values[..output.format.width], done, &mut self.row, &mut self.halves);
+                continue;
+            }
+            let (values, unit) = candidates.output(number, &output.value);
+            column.put(&values[..output.format.width], &unit, done, &mut self.row, &mut self.halves);
         }
     }
 }
 
 impl Column<'_> {
-    /// Stores the values of draws, zeros where one failed. `row` and `halves` are those of [`Filling`].
+    /// Stores the values of draws times their units, zeros where one failed. `row` and `halves` are those of [`Filling`].
     fn put<const L: usize>(
         &mut self,
         values: &[[f32; L]],
+        unit: &[f32; L],
         done: &[Done],
         row: &mut [f32],
         halves: &mut [f16],
@@ -118,7 +113,7 @@ impl Column<'_> {
             (Layout::Planes, Element::F16) => {
                 for done in done {
                     let row = &mut row[..width];
-                    copy(values, done, row);
+                    copy(values, unit, done, row);
                     for (plane, &value) in self.planes.iter_mut().zip(&*row) {
                         cast_slice_mut::<_, f16>(plane)[done.number] = f16::from_f32(value);
                     }
@@ -127,7 +122,7 @@ impl Column<'_> {
             (Layout::Planes, _) => {
                 for done in done {
                     let row = &mut row[..width];
-                    copy(values, done, row);
+                    copy(values, unit, done, row);
                     for (plane, value) in self.planes.iter_mut().zip(&*row) {
                         plane[done.number] = value.to_bits();
                     }
@@ -137,7 +132,7 @@ impl Column<'_> {
                 let rows = cast_slice_mut::<_, f16>(self.planes[0]);
                 let eights = width.next_multiple_of(8);
                 for done in done {
-                    copy(values, done, &mut row[..width]);
+                    copy(values, unit, done, &mut row[..width]);
                     halves[..eights].convert_from_f32_slice(&row[..eights]);
                     rows[done.number * stride..][..width].copy_from_slice(&halves[..width]);
                 }
@@ -145,29 +140,29 @@ impl Column<'_> {
             _ => {
                 let rows = cast_slice_mut(self.planes[0]);
                 for done in done {
-                    copy(values, done, &mut rows[done.number * stride..][..width]);
+                    copy(values, unit, done, &mut rows[done.number * stride..][..width]);
                 }
             }
         }
     }
 }
 
-/// Copies the values of a draw. By fours, and not inlined: with AVX-512 LLVM would make gathers of it, at several
+/// Copies the values of a draw times their unit. By fours, and not inlined: with AVX-512 LLVM would make gathers of it, at several
 /// times the cost of plain loads.
 #[inline(never)]
-fn copy<const L: usize>(values: &[[f32; L]], done: &Done, row: &mut [f32]) {
+fn copy<const L: usize>(values: &[[f32; L]], unit: &[f32; L], done: &Done, row: &mut [f32]) {
     if done.tally == Tally::FAILED {
         return row.fill(0.0);
     }
     let lane = done.lane;
-    assert!(lane < L);
+    let unit = unit[lane];
     let (from, from_rest) = values.as_chunks::<4>();
     let (to, to_rest) = row.as_chunks_mut::<4>();
     for (to, from) in to.iter_mut().zip(from) {
-        *to = [from[0][lane], from[1][lane], from[2][lane], from[3][lane]];
+        *to = [from[0][lane] * unit, from[1][lane] * unit, from[2][lane] * unit, from[3][lane] * unit];
     }
     for (to, from) in to_rest.iter_mut().zip(from_rest) {
-        *to = from[lane];
+        *to = from[lane] * unit;
     }
 }
 

@@ -34,8 +34,6 @@ pub(crate) struct Kernel<R> {
     limit: R,
     tests_scaled: bool,
     may_exceed_one: bool,
-    /// Whether spectra come out, and scaled.
-    scales_spectra: bool,
     max_attempts: u32,
     outputs: Vec<Output<R>>,
 }
@@ -78,11 +76,31 @@ enum Unit<R> {
 /// The candidates that are being made, a lane each.
 struct Candidates<R, const L: usize> {
     normals: Vec<[R; L]>,
+    /// Before it is multiplied by the scale.
     spectrum: Vec<[R; L]>,
-    /// What multiplies the spectrum.
     scale: [R; L],
-    /// The values of each output that is a map.
-    maps: Vec<Vec<[R; L]>>,
+    /// For each output; empty where it is no map.
+    maps: Vec<Mapped<R, L>>,
+}
+
+/// The values of a map, and what they are to be multiplied by.
+struct Mapped<R, const L: usize> {
+    values: Vec<[R; L]>,
+    unit: [R; L],
+}
+
+impl<R: Real, const L: usize> Candidates<R, L> {
+    /// The values of output `number`, without a tally's, and what each is to be multiplied by as it is stored: most
+    /// candidates are not, and LLVM makes scatters of such products in lanes.
+    #[inline(always)]
+    fn output(&self, number: usize, value: &Value<R>) -> (&[[R; L]], [R; L]) {
+        match value {
+            Value::Spectrum => (&self.spectrum, self.scale),
+            Value::Map(..) => (&self.maps[number].values, self.maps[number].unit),
+            Value::Level => (std::slice::from_ref(&self.scale), [R::ONE; L]),
+            Value::Tally => (&[], [R::ONE; L]),
+        }
+    }
 }
 
 /// Where draws go. A trait and not a closure, for the reason of [`Blocks`].
@@ -126,7 +144,6 @@ impl<R: Real> Kernel<R> {
             limit,
             tests_scaled: program.tests_scaled(),
             may_exceed_one: program.may_exceed_one(),
-            scales_spectra: program.scales() && program.outputs.iter().any(|o| o.source == Source::Spectrum),
             max_attempts: program.max_attempts,
             outputs: program.outputs.iter().map(output).collect(),
         }
@@ -167,18 +184,15 @@ impl<R: Real> Kernel<R> {
     }
 
     fn values(&self, candidates: &Candidates<R, 1>, tally: Tally) -> Vec<Vec<R>> {
-        let first = |values: &[[R; 1]], count| values[..count].iter().map(|[value]| *value).collect();
-        let zero_where_failed = |values: Vec<R>| match tally {
-            Tally::FAILED => vec![R::ZERO; values.len()],
-            _ => values,
-        };
-        let values = self.outputs.iter().zip(&candidates.maps).map(|(output, maps)| match output.value {
-            Value::Spectrum => first(&candidates.spectrum, self.spectrum.values),
-            Value::Map(ref map, _) => first(maps, map.values),
-            Value::Level => vec![candidates.scale[0]],
-            Value::Tally => Vec::new(),
+        let values = self.outputs.iter().enumerate().map(|(number, output)| {
+            let (values, [unit]) = candidates.output(number, &output.value);
+            let width = values.len().min(output.format.width);
+            match tally {
+                Tally::FAILED => vec![R::ZERO; width],
+                _ => values[..width].iter().map(|&[value]| value * unit).collect(),
+            }
         });
-        values.map(zero_where_failed).collect()
+        values.collect()
     }
 
     /// Makes all of `draws`, each of which goes to `to` when it is done.
@@ -200,9 +214,10 @@ impl<R: Real> Kernel<R> {
 
     fn candidates<const L: usize>(&self) -> Candidates<R, L> {
         let maps = self.outputs.iter().map(|output| match &output.value {
-            Value::Map(map, _) => vec![[R::ZERO; L]; 4 * map.offset.len()],
-            _ => Vec::new(),
+            Value::Map(map, _) => map.offset.len(),
+            _ => 0,
         });
+        let maps = maps.map(|fours| Mapped { values: vec![[R::ZERO; L]; 4 * fours], unit: [R::ONE; L] });
         Candidates {
             normals: vec![[R::ZERO; L]; self.spectrum.components.next_multiple_of(2)],
             spectrum: vec![[R::ZERO; L]; 4 * self.spectrum.offset.len()],
@@ -251,29 +266,19 @@ impl<R: Real> Kernel<R> {
                 candidates.scale[l] = level.of(word[l]);
             }
         }
-        if self.scales_spectra {
-            for s in &mut candidates.spectrum {
-                multiply(s, &candidates.scale);
-            }
-        }
-        for (output, values) in self.outputs.iter().zip(&mut candidates.maps) {
+        for (output, mapped) in self.outputs.iter().zip(&mut candidates.maps) {
             let Value::Map(map, unit) = &output.value else { continue };
-            map.apply(&candidates.normals, values);
-            let unit = match unit {
-                Unit::One => continue,
-                Unit::Scale => candidates.scale,
+            map.apply(&candidates.normals, &mut mapped.values);
+            match unit {
+                Unit::One => {}
+                Unit::Scale => mapped.unit = candidates.scale,
                 Unit::Over(over) => {
                     let mut values = [[R::ZERO; L]; 4];
                     over.apply(&candidates.normals, &mut values);
-                    let [mut unit, ..] = values;
-                    for value in &mut unit {
-                        *value = R::ONE / floored(*value);
+                    for l in 0..L {
+                        mapped.unit[l] = R::ONE / floored(values[0][l]);
                     }
-                    unit
                 }
-            };
-            for value in values {
-                multiply(value, &unit);
             }
         }
         verdicts
@@ -352,13 +357,6 @@ fn least<R: Real>(a: R, b: R) -> R {
 #[inline(always)]
 fn largest<R: Real>(a: R, b: R) -> R {
     if b > a { b } else { a }
-}
-
-#[inline(always)]
-fn multiply<R: Real, const L: usize>(values: &mut [R; L], by: &[R; L]) {
-    for l in 0..L {
-        values[l] = values[l] * by[l];
-    }
 }
 
 /// The least and the largest value of each lane.
