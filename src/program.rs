@@ -6,6 +6,9 @@
 //! scale in its gains. What is left of a draw is one rule that the spectrum must obey, and one factor that scales it.
 //! The shader and the CPU engine both work from this, and round it once.
 
+use std::collections::HashMap;
+use std::iter;
+
 use crate::cover::{Cover, Proposal};
 use crate::dataset::Kind;
 use crate::model::Model;
@@ -69,6 +72,23 @@ pub(crate) struct Target {
     /// where a candidate is dark.
     pub(crate) weights: Vec<f64>,
     pub(crate) bounds: Bounds,
+}
+
+impl Target {
+    /// The same for these spectra, with the weights of bands that are alike on the first of them. A driver may take
+    /// v s + w s for (v + w) s, which rounds otherwise.
+    pub(crate) fn of_unlike_bands(mut self, spectrum: &Affine) -> Target {
+        let mut first = HashMap::new();
+        for (band, offset) in spectrum.offset.iter().enumerate() {
+            let numbers = iter::once(offset).chain(spectrum.gain.iter().map(|gain| &gain[band]));
+            let rounded: Vec<u32> = numbers.map(|&number| (number as f32).to_bits()).collect();
+            let like = *first.entry(rounded).or_insert(band);
+            if like < band {
+                self.weights[like] += std::mem::take(&mut self.weights[band]);
+            }
+        }
+        self
+    }
 }
 
 /// An intensity that differs from draw to draw: a function of one uniform word of the draw.

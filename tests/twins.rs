@@ -10,8 +10,8 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use spectroll::statistics::tinted;
 use spectroll::{
-    Bounds, Builtin, Choice, Dataset, Draws, Engine, EngineError, Extend, Fit, Grid, Kind, Model, Real,
-    Recipe, Stream, Tally, colorimetry,
+    Bounds, Builtin, Choice, Dataset, Draws, Engine, EngineError, Extend, Fit, Grid, Kind, Model, Parts,
+    Real, Recipe, Stream, Tally, colorimetry,
 };
 
 /// How far an adapter that fuses may be off, in units in the last place of the largest term.
@@ -193,6 +193,28 @@ fn covariances_scaled_and_full() {
     }
     assert_twins(&Case::plain(&tinted()), Stream::new(3).draws(0..20_001));
     assert_twins(&Case::new(&tinted(), Some((0.4, Bounds::Both)), 2.0), Stream::new(3).draws(0..20_001));
+}
+
+/// Greys, and surfaces of two levels: what a driver may factor out of a sum over bands.
+#[test]
+fn bands_that_are_alike() {
+    let parts = builtin("munsell-vrhel").parts().clone();
+    for edge in [31, 12] {
+        let level = |band: usize| if band < edge { 1.0 } else { 0.5 };
+        let basis = DMatrix::from_fn(1, 31, |_, band| level(band)).normalize();
+        let model = Model::new(Parts {
+            mean: DVector::from_fn(31, |band, _| 0.4 * level(band)),
+            basis,
+            weight_mean: DVector::zeros(1),
+            weight_covariance: DMatrix::from_element(1, 1, 0.25),
+            explained_variance: vec![1.0],
+            ..parts.clone()
+        });
+        let model = model.expect("it is a model");
+        for bounds in ALL_BOUNDS {
+            assert_twins(&Case::new(&model, Some((0.3, bounds)), 1.0), Stream::new(12).draws(0..20_001));
+        }
+    }
 }
 
 #[test]

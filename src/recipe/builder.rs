@@ -139,8 +139,8 @@ impl RecipeBuilder {
         if let Some(xyz) = self.xyz {
             weights = self.condition(&weights)?.given(xyz, &weights);
         }
-        let mut program =
-            Program { target, max_attempts: self.max_attempts, ..Program::new(&self.model, &weights) };
+        let mut program = Program { max_attempts: self.max_attempts, ..Program::new(&self.model, &weights) };
+        program.target = target.map(|target| target.of_unlike_bands(&program.spectrum));
         let mut asked = self.outputs.clone();
         if let Some(intensity) = self.intensity {
             program = self.brighten(program, intensity)?;
