@@ -15,7 +15,7 @@ pub(crate) const SCENES: u32 = 8;
 /// Tiles in a row of a wall, and rows.
 pub(crate) const TILES: u32 = 15;
 /// Pixels of a tile.
-const TILE: u32 = 12;
+pub(crate) const TILE: u32 = 12;
 
 pub(crate) fn walls() -> Result<Scene, SceneError> {
     let surfaces = Model::builtin("munsell-vrhel").expect("it is built in");

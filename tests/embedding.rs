@@ -1,9 +1,9 @@
 //! Spectroll as a guest: on a host's device with no features and small limits, in its encoders and in its shaders.
 
-#![allow(clippy::duplicate_mod)] // both examples have the host's boilerplate
+#![allow(clippy::duplicate_mod)] // all examples have the host's boilerplate
 
 use spectroll::{
-    Layout, Model, Quantity, Recipe, Sampler, SamplerError, Stream, colorimetry,
+    Choice, Engine, EngineError, Layout, Model, Quantity, Recipe, Sampler, SamplerError, Stream, colorimetry,
     wgpu::{self, BufferUsages},
 };
 
@@ -11,6 +11,8 @@ use spectroll::{
 mod embed;
 #[path = "../examples/inline.rs"]
 mod inline;
+#[path = "../examples/scene.rs"]
+mod scene;
 use embed::host;
 
 fn surfaces() -> Recipe {
@@ -188,6 +190,56 @@ fn chips_have_the_colours_of_the_cpu_and_one_luminance() {
                 [colour[0], colour[1], colour[2]]
             }
             (true, false) => [0.3; 3],
+        }
+    });
+    println!("{count} of {} pixels differ, by at most {most}", image.pixels.len());
+    assert!(count < image.pixels.len() / 200 && most <= 1, "{count} pixels differ, by up to {most}");
+}
+
+#[test]
+fn walls_have_the_colours_of_the_cpu() {
+    let image = scene::picture().expect("it can be made");
+    let walls = scene::walls().expect("it can be drawn");
+    let observer = colorimetry::cmf(walls.grid());
+    let bands = walls.grid().len();
+    let engine = Engine::new(&Choice::Cpu).expect("the CPU is always there");
+    let mut spectra: [Vec<f32>; 3] = Default::default();
+    let mut drawer = walls.drawer(&engine).expect("it can be drawn");
+    let drawn = drawer.draw(0..u64::from(scene::SCENES), |window| {
+        for (spectra, group) in spectra.iter_mut().zip(["lamp", "wall", "target"]) {
+            spectra.extend_from_slice(window.values(group));
+        }
+        Ok::<_, EngineError>(())
+    });
+    drawn.expect("every draw finds a candidate");
+    let [lamps, tiles, targets] = &spectra;
+    let spectrum = |of: &[f32], number: u32| -> Vec<f64> {
+        of[number as usize * bands..][..bands].iter().map(|&s| f64::from(s)).collect()
+    };
+    let colour = |number: u32, reflectance: &[f64]| {
+        let lamp = spectrum(lamps, number);
+        let seen = observer.each_ref().map(|f| f.iter().zip(&lamp).map(|(f, l)| f * l).collect::<Vec<_>>());
+        let white: f64 = seen[1].iter().sum();
+        let product = |f: &Vec<f64>| f.iter().zip(reflectance).map(|(f, r)| f * r).sum::<f64>() / white;
+        colorimetry::linear_srgb(seen.each_ref().map(product))
+    };
+    let side = scene::TILES;
+    let of_targets: Vec<_> = (0..scene::SCENES).map(|s| colour(s, &spectrum(targets, s))).collect();
+    let of_tiles: Vec<_> = (0..scene::SCENES * side * side)
+        .map(|number| colour(number / (side * side), &spectrum(tiles, number)))
+        .collect();
+    let cell = (side + 1) * scene::TILE;
+    let middle = (side - 5) / 2..(side + 5) / 2;
+    let (count, most) = differences(&image.pixels, image.width, |x, y| {
+        let number = y / cell * (scene::SCENES / 2) + x / cell;
+        // Half a tile of frame on each side.
+        let tile = [x, y].map(|v| (v % cell).checked_sub(scene::TILE / 2).map(|v| v / scene::TILE));
+        match tile {
+            [Some(x), Some(y)] if x < side && y < side => match middle.contains(&x) && middle.contains(&y) {
+                true => of_targets[number as usize],
+                false => of_tiles[((number * side + y) * side + x) as usize],
+            },
+            _ => BACKGROUND,
         }
     });
     println!("{count} of {} pixels differ, by at most {most}", image.pixels.len());
