@@ -62,6 +62,7 @@ pub use program::{Bounds, Tally};
 pub use quantity::{Element, Format, Layout, Quantity};
 pub use recipe::{
     DEFAULT_MAX_ATTEMPTS, Drawn, Intensity, Luminance, Proposal, Recipe, RecipeBuilder, RecipeError,
+    ScalarDrawer,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
 pub use stream::{Draws, Stream, StreamRng};

@@ -36,6 +36,18 @@ fn npz() {
     equals(folder.path(), load, "f['spectra']", "f['wavelengths']");
 }
 
+/// Not the words that engines hold them in, which also say whether a value reached 1.
+#[test]
+fn attempts_are_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = "sample munsell-vrhel -n 2000 --lrv 0.6 --quantities attempts -o a.csv";
+    let (_, summary) = succeeds(folder.path(), drawn);
+    assert!(summary.contains("reach 1 or more"), "{summary}");
+    let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    let counts: Vec<u32> = text.lines().skip(1).map(|line| line.parse().unwrap()).collect();
+    assert!(counts.len() == 2000 && counts.iter().all(|count| (1..100).contains(count)), "{counts:?}");
+}
+
 #[test]
 fn hdf5() {
     let folder = tempfile::tempdir().unwrap();

@@ -171,7 +171,8 @@ fn draw(
         let part = Draws { first, count: part.end - part.start, ..draws };
         let drawn = drawer.draw(part, |batch| {
             check_interrupt()?;
-            sink.write(&request::columns(recipe, &batch))?;
+            let columns = request::columns(recipe, &batch);
+            sink.write(&columns.iter().map(|column| &**column).collect::<Vec<_>>())?;
             progress.advance(batch.draws.count);
             anyhow::Ok(())
         })?;

@@ -155,7 +155,7 @@ impl Redrawing {
         engine.draw(&self.recipe, draws, |batch| {
             check_interrupt()?;
             for (column, bytes) in columns.iter_mut().zip(request::columns(&self.recipe, &batch)) {
-                column.extend_from_slice(bytes);
+                column.extend_from_slice(&bytes);
             }
             anyhow::Ok(())
         })?;

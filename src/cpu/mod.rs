@@ -168,19 +168,24 @@ impl<R: Real> Kernel<R> {
         only.1.expect("one draw was asked for")
     }
 
-    /// The candidate of the words that `block` gives for each block, as the values of each output; `None` where it is
-    /// rejected.
-    pub(crate) fn candidate(&self, mut block: impl FnMut(u32) -> [u32; 4]) -> Option<Vec<Vec<R>>> {
+    /// The candidate of the words that `block` gives for each block, the `attempt`-th of its draw: the values of each
+    /// output, and what its draw took; `None` where it is rejected.
+    pub(crate) fn candidate(
+        &self,
+        attempt: u32,
+        mut block: impl FnMut(u32) -> [u32; 4],
+    ) -> Option<(Vec<Vec<R>>, Tally)> {
         let mut candidates = self.candidates::<1>();
         let kept = self.propose(&mut candidates, &mut block);
         let word = self.level.as_ref().map(|_| [block(level::BLOCK)[0]]);
         let verdicts = self.judge(&mut candidates, kept, word);
-        verdicts.accepted[0].then(|| self.values(&candidates, Tally::accepted(1, false)))
+        let tally = Tally::accepted(attempt, verdicts.above_one[0]);
+        verdicts.accepted[0].then(|| (self.values(&candidates, tally), tally))
     }
 
     /// Whether the candidate of those words is accepted.
     pub(crate) fn accepts(&self, block: impl FnMut(u32) -> [u32; 4]) -> bool {
-        self.candidate(block).is_some()
+        self.candidate(1, block).is_some()
     }
 
     fn values(&self, candidates: &Candidates<R, 1>, tally: Tally) -> Vec<Vec<R>> {
@@ -289,7 +294,7 @@ impl<R: Real> Map<R> {
     fn new(map: &Affine) -> Map<R> {
         let fours = |row: &[f64]| -> Vec<[R; 4]> {
             let four = |values: &[f64]| {
-                // No -0: see `forms` of src/wgsl.
+                // No -0: see `forms` of src/wgsl/arithmetic.rs.
                 std::array::from_fn(|i| R::from_f64(values[i.min(values.len() - 1)] + 0.0))
             };
             row.chunks(4).map(four).collect()

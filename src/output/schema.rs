@@ -134,7 +134,7 @@ pub struct Constant {
     pub bytes: Vec<u8>,
 }
 
-/// What is made from one description has the same values.
+/// Ignores the values, which a manifest does not hold: those of one description are the same.
 impl PartialEq for Constant {
     fn eq(&self, other: &Constant) -> bool {
         (&self.name, &self.axes, self.element) == (&other.name, &other.axes, other.element)
