@@ -9,6 +9,8 @@
 //! several levels of instructions, of which the best is chosen at run time; multiplications and additions are never
 //! fused, so all of them give the same bytes.
 
+#![allow(clippy::needless_range_loop)] // a lane is an index, of several arrays at once
+
 mod columns;
 mod lanes;
 
@@ -41,7 +43,6 @@ pub(crate) struct Kernel<R> {
 /// An [`Affine`] map of the normals, by four values: so many sums at once keep a core busy, and share what is read of
 /// the normals. The last value fills the last four up, so that it is no special case.
 struct Map<R> {
-    values: usize,
     offset: Vec<[R; 4]>,
     /// k gains for each four values.
     gain: Vec<[R; 4]>,
@@ -149,10 +150,10 @@ impl<R: Real> Kernel<R> {
         }
     }
 
-    /// The number of bands.
+    /// How many values the first output has.
     #[cfg(feature = "report")]
-    pub(crate) fn bands(&self) -> usize {
-        self.spectrum.values
+    pub(crate) fn width(&self) -> usize {
+        self.outputs[0].format.width
     }
 
     /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
@@ -208,9 +209,10 @@ impl<R: Real> Kernel<R> {
         while lanes.are_busy() {
             let words = lanes.words();
             let kept = self.propose(&mut candidates, words);
-            let word = match self.level {
-                Some(_) => Some(Attempts { attempts: [0; L], ..words }.block(level::BLOCK)[0]),
-                None => None,
+            let word = if self.level.is_some() {
+                Some(Attempts { attempts: [0; L], ..words }.block(level::BLOCK)[0])
+            } else {
+                None
             };
             let verdicts = self.judge(&mut candidates, kept, word);
             to.take(lanes.advance(&verdicts, self.max_attempts), &candidates);
@@ -302,7 +304,7 @@ impl<R: Real> Map<R> {
         let gains: Vec<_> = map.gain.iter().map(|row| fours(row)).collect();
         let offset = fours(&map.offset);
         let gain = (0..offset.len()).flat_map(|i| gains.iter().map(move |row| row[i])).collect();
-        Map { values: map.offset.len(), offset, gain, components: map.gain.len() }
+        Map { offset, gain, components: map.gain.len() }
     }
 
     /// offset + gain . z, each value in the order of the components. Four values are made for each begun four.

@@ -37,7 +37,7 @@ pub enum RecipeError {
     TooFewDirections,
     #[error("{}", unreachable_xyz(*xyz, *nearest))]
     UnreachableXyz { xyz: [f64; 3], nearest: Option<[f64; 3]> },
-    #[error("an intensity of {0}: it must be from 1e-30 to 1e30")]
+    #[error("an intensity of {0}: it must be above 0, from 1e-30 to 1e30")]
     Intensity(f64),
     #[error(
         "an intensity between {low} and {high}: the second must be above the first, and at most 2^126 times it"
