@@ -170,7 +170,10 @@ fn intensity(text: &str) -> Result<IntensityName, String> {
 pub(super) fn schema(recipe: &Recipe, count: u64, stored: Element) -> Schema {
     let field = |format: spectroll::Format| {
         let axis = match format.quantity {
-            Quantity::Spectra => "wavelength",
+            Quantity::Spectra => {
+                let field = Field::vector("spectra", "wavelength", format.width, format.element);
+                return field.within(recipe.interval());
+            }
             Quantity::Weights => "component",
             Quantity::Xyz | Quantity::Srgb => "channel",
             Quantity::Lrv | Quantity::Attempts | Quantity::Intensity => {

@@ -23,7 +23,7 @@ use crate::dataset::Kind;
 use crate::level::{self, Level};
 use crate::normal::Real;
 use crate::program::{self, Affine, Program, Source, Tally};
-use crate::quantity::Format;
+use crate::quantity::{Format, Interval};
 use crate::stream::{Attempts, Blocks, Draws, Stream};
 
 /// A [`Program`] with its numbers rounded to `R`.
@@ -37,6 +37,8 @@ pub(crate) struct Kernel<R> {
     tests_scaled: bool,
     may_exceed_one: bool,
     max_attempts: u32,
+    /// What the values of spectra are between.
+    interval: Interval,
     outputs: Vec<Output<R>>,
 }
 
@@ -146,6 +148,7 @@ impl<R: Real> Kernel<R> {
             tests_scaled: program.tests_scaled(),
             may_exceed_one: program.may_exceed_one(),
             max_attempts: program.max_attempts,
+            interval: program.interval(),
             outputs: program.outputs.iter().map(output).collect(),
         }
     }

@@ -61,7 +61,10 @@ impl RecipeBuilder {
         self
     }
 
-    /// Spectra in 16 bits, rounded to nearest and ties to even; other quantities stay in 32.
+    /// Spectra in 16 bits, rounded to nearest and ties to even, but never to an end of their [`Interval`]; above 65,504
+    /// they are infinite. Other quantities stay in 32 bits.
+    ///
+    /// [`Interval`]: crate::Interval
     pub fn half_spectra(mut self) -> Self {
         self.outputs.spectra = Element::F16;
         self

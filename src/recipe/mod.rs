@@ -14,7 +14,7 @@ use crate::dataset::Kind;
 use crate::model::Model;
 use crate::normal::Real;
 use crate::program::{self, Program};
-use crate::quantity::Format;
+use crate::quantity::{Format, Interval};
 use crate::region;
 use crate::stream::Stream;
 use crate::wgsl::{self, TextError};
@@ -114,6 +114,11 @@ impl Recipe {
     /// How many boxes candidates are proposed from, and how many bytes their table has, where there is a cover.
     pub fn cover(&self) -> Option<(usize, usize)> {
         self.cover
+    }
+
+    /// What the values of its spectra are between.
+    pub fn interval(&self) -> Interval {
+        self.program.interval()
     }
 
     /// What comes out, and how it lies in memory, in the order of [`Quantity`].
