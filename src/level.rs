@@ -4,8 +4,8 @@
 
 use std::f32::consts::LN_2;
 
-use crate::normal::Real;
 use crate::program;
+use crate::real::Real;
 
 /// Where the word comes from: block 255 of attempt 0, whichever attempt the draw takes.
 pub(crate) const BLOCK: u32 = 255;

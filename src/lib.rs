@@ -19,6 +19,7 @@ mod region;
 mod level;
 mod normal;
 mod philox;
+mod real;
 mod stream;
 mod truncated;
 
@@ -56,10 +57,10 @@ pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, a
 pub use fit::{Fit, FitError};
 pub use grid::{Extend, Grid, GridError};
 pub use model::{MAX_COMPONENTS, Model, ModelError, Normalization, Parts};
-pub use normal::Real;
 pub use philox::philox;
 pub use program::{Bounds, Tally};
 pub use quantity::{Element, Format, Interval, Layout, Quantity};
+pub use real::Real;
 pub use recipe::{
     DEFAULT_MAX_ATTEMPTS, Drawn, Intensity, Luminance, Proposal, Recipe, RecipeBuilder, RecipeError,
     ScalarDrawer,

@@ -13,106 +13,6 @@
 
 use std::f32::consts::LN_2;
 use std::f64::consts::{SQRT_2, TAU};
-use std::ops::{Add, Div, Mul};
-
-use crate::level;
-use crate::truncated;
-
-/// A floating-point type that draws can be computed in: f32, the shader's twin, or f64, its oracle.
-pub trait Real:
-    Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Send + Sync + 'static
-{
-    /// 0.
-    const ZERO: Self;
-    /// 1.
-    const ONE: Self;
-    /// Infinity.
-    const INFINITY: Self;
-    /// What a divisor is raised to where it might not be positive.
-    const FLOOR: Self;
-    /// The nearest value.
-    fn from_f64(value: f64) -> Self;
-    /// Two independent standard normals of two independent uniform words.
-    fn normal_pair(x: u32, y: u32) -> [Self; 2];
-    /// The uniform number (x + 1/2) 2^-32 of a word.
-    fn uniform(x: u32) -> Self;
-    /// 2 to this power, which is between 0 and 126.
-    fn exp2(self) -> Self;
-    /// A coordinate of a box, of a uniform word: relative to a centre, and what it costs. The four numbers of an axis
-    /// and the cost are those of `src/truncated.rs`.
-    fn truncated(axis: [Self; 4], word: u32) -> [Self; 2];
-    /// -2 ln u of a uniform word u: a chi-square of two degrees of freedom.
-    fn chi_square(word: u32) -> Self;
-}
-
-impl Real for f32 {
-    const ZERO: f32 = 0.0;
-    const ONE: f32 = 1.0;
-    const INFINITY: f32 = f32::INFINITY;
-    const FLOOR: f32 = 1e-30;
-
-    fn from_f64(value: f64) -> f32 {
-        value as f32
-    }
-
-    #[inline(always)]
-    fn normal_pair(x: u32, y: u32) -> [f32; 2] {
-        let r = radius(x);
-        circle(y).map(|v| r * v)
-    }
-
-    #[inline(always)]
-    fn uniform(x: u32) -> f32 {
-        level::uniform(x)
-    }
-
-    #[inline(always)]
-    fn exp2(self) -> f32 {
-        level::exp2(self)
-    }
-
-    #[inline(always)]
-    fn truncated(axis: [f32; 4], word: u32) -> [f32; 2] {
-        truncated::truncated(axis, word)
-    }
-
-    #[inline(always)]
-    fn chi_square(word: u32) -> f32 {
-        truncated::chi_square(word)
-    }
-}
-
-impl Real for f64 {
-    const ZERO: f64 = 0.0;
-    const ONE: f64 = 1.0;
-    const INFINITY: f64 = f64::INFINITY;
-    const FLOOR: f64 = 1e-30;
-
-    fn from_f64(value: f64) -> f64 {
-        value
-    }
-
-    fn normal_pair(x: u32, y: u32) -> [f64; 2] {
-        let r = exact_radius(x);
-        exact_circle(y).map(|v| r * v)
-    }
-
-    fn uniform(x: u32) -> f64 {
-        (f64::from(x) + 0.5) * 2f64.powi(-32)
-    }
-
-    fn exp2(self) -> f64 {
-        f64::exp2(self)
-    }
-
-    fn truncated(axis: [f64; 4], word: u32) -> [f64; 2] {
-        truncated::exact_truncated(axis, word)
-    }
-
-    fn chi_square(word: u32) -> f64 {
-        truncated::exact_chi_square(word)
-    }
-}
 
 /// log(1 + t) for t in [sqrt(1/2) - 1, sqrt(2) - 1]. The coefficients are a minimax fit in f64, rounded one by one
 /// with the rest fitted again; relative error of the polynomial 3e-8.
@@ -167,13 +67,13 @@ pub(crate) fn circle(y: u32) -> [f32; 2] {
     [f32::from_bits(x.to_bits() ^ x_sign), f32::from_bits(y.to_bits() ^ y_sign)]
 }
 
-fn exact_radius(x: u32) -> f64 {
+pub(crate) fn exact_radius(x: u32) -> f64 {
     let w = |x: u32| (f64::from(x) + 0.5) / 2f64.powi(32);
     let log = if x < 0x8000_0000 { w(x).ln() } else { (-w(!x)).ln_1p() };
     (-log).sqrt() * SQRT_2
 }
 
-fn exact_circle(y: u32) -> [f64; 2] {
+pub(crate) fn exact_circle(y: u32) -> [f64; 2] {
     let (sine, cosine) = ((f64::from(y) + 0.5) / 2f64.powi(32) * TAU).sin_cos();
     [cosine, sine]
 }

@@ -19,9 +19,9 @@
 use std::f32::consts::LN_2;
 use std::f64::consts::{PI, SQRT_2};
 
-#[cfg(doc)]
-use crate::normal::Real;
 use crate::normal::{log1p_reduced, radius};
+#[cfg(doc)]
+use crate::real::Real;
 
 /// The two tails of a word: u and 1 - u, u = (x + 1/2) 2^-32. The smaller is exact to the last bit, so neither is
 /// ever 0.

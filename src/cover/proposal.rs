@@ -3,7 +3,7 @@
 //! An attempt's words, block by block: the first chooses a box, one follows for each axis, and the last thins.
 
 use super::alias::Alias;
-use crate::normal::Real;
+use crate::real::Real;
 use crate::stream::Blocks;
 
 /// The boxes, as a draw uses them.

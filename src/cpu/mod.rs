@@ -21,9 +21,9 @@ use lanes::{Done, Lanes};
 use crate::cover::Proposal;
 use crate::dataset::Kind;
 use crate::level::{self, Level};
-use crate::normal::Real;
 use crate::program::{self, Affine, Program, Source, Tally};
 use crate::quantity::{Format, Interval};
+use crate::real::Real;
 use crate::stream::{Attempts, Blocks, Draws, Stream};
 
 /// A [`Program`] with its numbers rounded to `R`.

@@ -5,9 +5,9 @@ use rand::distr::Distribution;
 
 use super::Recipe;
 use crate::cpu::Kernel;
-use crate::normal::Real;
 use crate::program::Tally;
 use crate::quantity::Quantity;
+use crate::real::Real;
 use crate::stream::Stream;
 
 /// Draws of a recipe, one at a time: in f32 as every engine makes them, in f64 without their rounding errors. See

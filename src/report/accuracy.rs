@@ -3,6 +3,7 @@
 
 use std::ops::{Add, Div, Mul};
 
+use half::f16;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -15,8 +16,8 @@ use super::{Bench, ReportError};
 use crate::colorimetry;
 use crate::dataset::Kind;
 use crate::model::Model;
-use crate::normal::Real;
 use crate::program::Tally;
+use crate::real::{Arithmetic, Real};
 use crate::recipe::Recipe;
 use crate::stream::{Draws, Stream};
 
@@ -95,7 +96,7 @@ pub(super) fn measure(
     }
     bench.say(&format!("{name}: variants"))?;
     let (ours, tallies) = judge.scalar::<f32>();
-    let half: Vec<f32> = ours.iter().map(|&v| to_half(v)).collect();
+    let half: Vec<f32> = ours.iter().map(|&v| f16::from_f32(v).to_f32()).collect();
     variants.push(Variant { bytes: 2, ..judge.variant("CPU, f32 rounded to f16", &half, &tallies) });
     let (coarse, tallies) = judge.scalar::<Coarse>();
     variants.push(judge.variant("CPU, f32, uniforms of 24 bits", &coarse, &tallies));
@@ -227,13 +228,6 @@ fn xyz_weights(model: &Model) -> [Vec<f64>; 3] {
     }
 }
 
-/// The nearest value of binary16, ties to even.
-fn to_half(value: f32) -> f32 {
-    let exponent = if value == 0.0 { -14 } else { value.abs().log2().floor().max(-14.0) as i32 };
-    let quantum = 2f32.powi(exponent - 10);
-    (value / quantum).round_ties_even() * quantum
-}
-
 /// An f32 whose normals are made in another way.
 macro_rules! altered {
     ($(#[$doc:meta])* $name:ident, $normals:expr) => {
@@ -269,6 +263,13 @@ macro_rules! altered {
         }
 
         impl Real for $name {
+            fn normal_pair(x: u32, y: u32) -> [Self; 2] {
+                let normals: fn(u32, u32) -> [f32; 2] = $normals;
+                normals(x, y).map($name)
+            }
+        }
+
+        impl Arithmetic for $name {
             const ZERO: Self = $name(f32::ZERO);
             const ONE: Self = $name(f32::ONE);
             const INFINITY: Self = $name(f32::INFINITY);
@@ -278,17 +279,12 @@ macro_rules! altered {
                 $name(value as f32)
             }
 
-            fn normal_pair(x: u32, y: u32) -> [Self; 2] {
-                let normals: fn(u32, u32) -> [f32; 2] = $normals;
-                normals(x, y).map($name)
-            }
-
             fn uniform(x: u32) -> Self {
-                $name(<f32 as Real>::uniform(x))
+                $name(f32::uniform(x))
             }
 
             fn exp2(self) -> Self {
-                $name(Real::exp2(self.0))
+                $name(Arithmetic::exp2(self.0))
             }
 
             fn truncated(axis: [Self; 4], word: u32) -> [Self; 2] {
@@ -312,29 +308,15 @@ altered!(
     /// Box-Muller as textbooks have it, with the logarithm, sine and cosine of the system's library.
     Platform,
     |x, y| {
-        let radius = (-2.0 * uniform(x).ln()).max(0.0).sqrt();
-        let (sine, cosine) = (std::f32::consts::TAU * uniform(y)).sin_cos();
+        let radius = (-2.0 * f32::uniform(x).ln()).max(0.0).sqrt();
+        let (sine, cosine) = (std::f32::consts::TAU * f32::uniform(y)).sin_cos();
         [radius * cosine, radius * sine]
     }
 );
 
-/// (x + 1/2) 2^-32, rounded as f32 has it.
-fn uniform(x: u32) -> f32 {
-    (x as f32 + 0.5) * 2f32.powi(-32)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn halves_are_rounded_to_11_bits() {
-        for (value, half) in
-            [(1.0, 1.0), (1.0 + 1.0 / 2048.0, 1.0), (0.1, 0.099_975_586), (3e-8, 5.960_464_5e-8)]
-        {
-            assert_eq!(to_half(value), half);
-        }
-    }
 
     #[test]
     fn coarse_uniforms_err_more_than_ours() {

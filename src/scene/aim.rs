@@ -6,8 +6,8 @@ use crate::condition::Condition;
 use crate::cpu::Kernel;
 use crate::dataset::Kind;
 use crate::level;
-use crate::normal::Real;
 use crate::program::{self, Affine, Program, Tally, Target};
+use crate::real::Arithmetic;
 use crate::recipe::{Proposal, Recipe, RecipeBuilder, RecipeError};
 use crate::stream::Stream;
 

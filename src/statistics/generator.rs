@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::checks::{correlation, distance, kolmogorov, two_sided};
-use crate::normal::Real;
+use crate::real::Real;
 use crate::stream::Stream;
 
 /// Cells of equal probability in a chi-squared test.

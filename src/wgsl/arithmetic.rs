@@ -13,8 +13,8 @@ use super::text::{Text, float, list};
 use super::{COVER_AT, Form, LOOPED, LUMINANCE, NORMALS};
 use crate::dataset::Kind;
 use crate::level;
-use crate::normal::Real;
 use crate::program::{Affine, Level, Program, Source, Unit};
+use crate::real::Arithmetic;
 
 /// All of it.
 pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
@@ -24,7 +24,7 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
     };
     if let Some(target) = &program.target {
         text.block("fn factor(z: Normals) -> f32", |body| {
-            let (lrv, floor) = (float(target.lrv), <f32 as Real>::FLOOR);
+            let (lrv, floor) = (float(target.lrv), <f32 as Arithmetic>::FLOOR);
             body.line(&format!("return {lrv} / max(luminance(z), {floor:?}f);"));
         });
     }

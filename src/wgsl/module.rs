@@ -4,9 +4,9 @@
 use super::tables::Tables;
 use super::text::{Text, list};
 use super::{Form, Target, UNROLLED_GAINS, functions};
-use crate::normal::Real;
 use crate::program::{Level, Program, Source, Unit};
 use crate::quantity::Quantity;
+use crate::real::Arithmetic;
 
 /// Why a recipe has no text.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -74,7 +74,8 @@ fn interface(program: &Program) -> String {
                         Unit::One => format!("return {head}({values});"),
                         Unit::Scale => format!("return d.scale * {head}({values});"),
                         Unit::Over(_) => {
-                            let over = format!("max({quantity}_over_0(d.z), {:?}f)", <f32 as Real>::FLOOR);
+                            let over =
+                                format!("max({quantity}_over_0(d.z), {:?}f)", <f32 as Arithmetic>::FLOOR);
                             format!("return (1f / {over}) * {head}({values});")
                         }
                     });

@@ -3,9 +3,9 @@
 use super::tables::Tables;
 use super::text::Text;
 use super::{Form, OUTPUTS_AT, Target, draws_per_thread};
-use crate::normal::Real;
 use crate::program::{Output, Program, Source, Tally, Unit};
 use crate::quantity::{Element, Format, Interval, Layout};
+use crate::real::Arithmetic;
 
 /// How the values of an output make words of its buffer.
 #[derive(Clone, Copy, PartialEq)]
@@ -106,7 +106,7 @@ impl Store<'_> {
                     Form::Unrolled => format!("{}_over_0({d}.z)", format.quantity),
                     Form::Looped => format!("form(&z_{d}, {}u)", self.tables.units[i]),
                 };
-                let floor = <f32 as Real>::FLOOR;
+                let floor = <f32 as Arithmetic>::FLOOR;
                 body.line(&format!("let {}_unit_{d} = 1f / max({over}, {floor:?}f);", format.quantity));
             }
         }
