@@ -121,7 +121,7 @@ impl Recipe {
         self.program.interval()
     }
 
-    /// What comes out, and how it lies in memory, in the order of [`Quantity`].
+    /// What comes out, and how it lies in memory, in the order of [`Quantity`](crate::Quantity).
     pub fn formats(&self) -> Vec<Format> {
         self.program.outputs.iter().map(|output| output.format).collect()
     }
