@@ -36,7 +36,7 @@ use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, 
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// A file of flags, as in `count = 1000`; flags beside it win
+    /// Take flags from a TOML file, as in `count = 1000`; those on the command line win over it
     #[arg(long, global = true, value_name = "FILE.toml")]
     config: Option<String>,
 }
