@@ -102,7 +102,10 @@ fn what_is_in_the_way_of_a_file_stays() {
     fails(folder.path(), "sample granada -n 5 -o old.npy", 1, "exists already");
     fails(folder.path(), "sample granada -n 5 -o folder.npy", 1, "is a folder");
     fails(folder.path(), "sample granada -n 5 -o no/such/x.npy", 1, "create it first");
-    fails(folder.path(), "sample granada -n 5 -o x.xlsx", 1, "name it .npy, .npz, .csv");
+    fails(folder.path(), "sample granada -n 5 -o x.xlsx", 2, "name it .npy, .npz, .csv");
+    let several = "sample granada -n 5 --quantities spectra,xyz -o x.npy";
+    fails(folder.path(), several, 2, "choose one with --quantities");
+    fails(folder.path(), "sample granada -n 5 --format npy -o -", 2, "standard output takes CSV only");
     fails(folder.path(), "sample granada -n 5 -o - --json", 2, "both write to standard output");
     fails(folder.path(), "sample granada -n 5 --force --format npy -o /dev/null", 1, "not a plain file");
     assert_eq!(fs::read_to_string(folder.path().join("old.npy")).unwrap(), "mine");

@@ -168,6 +168,10 @@ fn run(command: Command) -> anyhow::Result<()> {
 }
 
 fn exit_code(error: &anyhow::Error) -> u8 {
+    let is_request = |e: &OutputError| {
+        use OutputError::{Cannot, NotBuilt, UnknownFormat};
+        matches!(e, UnknownFormat { .. } | Cannot { .. } | NotBuilt { .. })
+    };
     let is_missing = |e: &EngineError| matches!(e, EngineError::NoAdapter { .. } | EngineError::NoAdapters);
     if error.is::<Interrupted>() {
         130
@@ -181,6 +185,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         || error.is::<SceneError>()
         || error.is::<TextError>()
         || error.is::<Usage>()
+        || error.downcast_ref::<OutputError>().is_some_and(is_request)
     {
         2
     } else {
