@@ -1,15 +1,13 @@
 """Spectroll beside NumPy and Numba, in one run on one machine.
 
 The programs take turns, so that all of them meet the machine's good and bad moments; medians are printed with their
-least and most. PEERS names a script of the same draws in NumPy and Numba (`peers.py MODEL.txt COUNT numpy|numba`);
-without it only Spectroll is measured.
+least and most.
 """
 
 import argparse
 import json
 import os
 import platform
-import re
 import shutil
 import statistics
 import subprocess
@@ -19,21 +17,8 @@ import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SPECTROLL = os.path.join(ROOT, "target", "release", "spectroll")
-PEERS = os.environ.get("PEERS", os.path.join(ROOT, "..", "shared", "peers", "peers.py"))
+PEERS = os.path.join(ROOT, "scripts", "peers.py")
 MEMORY = "/dev/shm" if os.path.isdir("/dev/shm") else tempfile.gettempdir()
-
-# What a NumPy user would write to fill a file: the same draws as `peers.py numpy`, into a memory-mapped .npy.
-NUMPY_FILE = """
-import sys, numpy as np
-m = np.loadtxt(sys.argv[1]).astype(np.float32); mu = m[:31]; B = m[31:217].reshape(6, 31) * m[217:223][:, None]
-n = int(sys.argv[2]); g = np.random.Generator(np.random.SFC64(1)); k = 0
-out = np.lib.format.open_memmap(sys.argv[3], 'w+', np.float32, (n, 31))
-while k < n:
-    r = g.standard_normal((1 << 18, 6), dtype=np.float32) @ B + mu
-    r = r[((r > 0) & (r < 1)).all(1)]; t = min(len(r), n - k); out[k:k + t] = r[:t]; k += t
-out.flush()
-"""
-
 
 def run(*command, env=None):
     """Standard output, seconds and peak resident megabytes of a command that must succeed."""
@@ -87,16 +72,13 @@ def in_process(rounds, model):
     for _ in range(rounds):
         for rate in json.loads(run(SPECTROLL, "bench", "--json", "--runs", "5")[0])["rates"]:
             rates.add(rate["engine"], rate["median"])
-        if model:
-            for peer in ("numpy", "numba"):
-                out = run(sys.executable, PEERS, model, "4e6", peer)[0]
-                rates.add(peer, float(re.search(r"([\d.]+) M accepted/s", out)[1]))
+        for peer in ("numpy", "numba"):
+            rates.add(peer, float(run(sys.executable, PEERS, model, "4e6", peer)[0]))
     print("In process, reflectances of 31 bands and 6 components, mapped for reading:")
     rates.show("million/s")
-    if model:
-        for engine in [name for name in rates.samples if name not in ("numpy", "numba")]:
-            for peer in ("numpy", "numba"):
-                rates.ratio(engine, peer)
+    for engine in [name for name in rates.samples if name not in ("numpy", "numba")]:
+        for peer in ("numpy", "numba"):
+            rates.ratio(engine, peer)
 
 
 def whole_process(rounds, model, count):
@@ -107,9 +89,8 @@ def whole_process(rounds, model, count):
         "spectroll --engine gpu": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force", "--engine", "gpu"],
         "spectroll --engine cpu": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force", "--engine", "cpu"],
         "dd": ["dd", "if=/dev/zero", f"of={out}", "bs=4M", f"count={size >> 22}", "status=none"],
+        "numpy": [sys.executable, PEERS, model, str(count), "numpy", out],
     }
-    if model:
-        commands["numpy"] = [sys.executable, "-c", NUMPY_FILE, model, str(count), out]
     try:
         for _ in range(rounds):
             for name, command in commands.items():
@@ -123,9 +104,8 @@ def whole_process(rounds, model, count):
     print(f"\nWhole process, {count:,} reflectances ({size / 1e9:.2f} GB) into a .npy file in {MEMORY}:")
     seconds.show("s")
     for name in ("numpy", "dd"):
-        if name in seconds.samples:
-            seconds.ratio(name, "spectroll --engine gpu")
-            seconds.ratio(name, "spectroll --engine cpu")
+        seconds.ratio(name, "spectroll --engine gpu")
+        seconds.ratio(name, "spectroll --engine cpu")
     print("  peak resident memory:")
     memory.show("MB")
 
@@ -185,7 +165,7 @@ def main():
     arguments = parser.parse_args()
     print(f"{time.strftime('%Y-%m-%d')}, {os.cpu_count()} cores, {platform.machine()}, {platform.system()}\n")
     with tempfile.TemporaryDirectory() as folder:
-        model = peers_model(folder) if os.path.exists(PEERS) else None
+        model = peers_model(folder)
         in_process(arguments.rounds, model)
         whole_process(arguments.rounds, model, arguments.count)
         latency(arguments.rounds, folder)

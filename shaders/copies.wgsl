@@ -4,9 +4,9 @@ struct Sizes {
     /// How many values come out.
     values: u32,
     bands: u32,
-    /// How many copies follow each other that have one shape,
+    /// Consecutive copies that share a shape.
     copies: u32,
-    /// and how many that have one intensity.
+    /// Consecutive copies that share an intensity.
     lights: u32,
 }
 

@@ -1,5 +1,5 @@
-// Draw `index` of a stream: candidates until one is accepted, attempt by attempt. CPU twin: src/cpu/mod.rs. A line
-// that ends in `if` and a word is there only for programs of which src/wgsl/mod.rs says it.
+// Draw `index` of a stream: candidates until one is accepted, attempt by attempt. CPU twin: src/cpu/mod.rs. Lines
+// that end in `// if` and a word are kept only for programs with that property; src/wgsl/mod.rs filters them.
 
 struct Draw {
     z: Normals,

@@ -1,6 +1,6 @@
 // The arithmetic of a program too large for straight lines: the same operations in the same order, in loops over
 // components and bands that read the model from a buffer. Before it come the constants BANDS, COMPONENTS and BLOCKS;
-// the buffer holds what `tables` of src/wgsl/mod.rs says.
+// the buffer holds what src/wgsl/tables.rs says.
 
 alias Normals = array<f32, 4u * BLOCKS>;
 

@@ -166,6 +166,23 @@ mod tests {
     use crate::dataset::Table;
     use crate::grid::{Extend, Grid};
 
+    #[test]
+    fn a_spectrum_that_cannot_be_normalised_is_named_by_its_source() {
+        let wavelengths = vec![400.0, 410.0, 420.0];
+        let table = |name, spectra: &[[f64; 3]]| {
+            let spectra: Vec<_> = spectra.iter().map(|s| s.to_vec()).collect();
+            Table::new(name, wavelengths.clone(), &spectra).unwrap()
+        };
+        let tables = [
+            table("a.csv", &[[1.0, 2.0, 3.0], [2.0, 1.0, 1.0]]),
+            table("b.csv", &[[1.0, 1.0, 2.0], [0.0; 3]]),
+        ];
+        let data = Dataset::new(&tables, Grid::new(400.0, 10.0, 3).unwrap(), Extend::Error).unwrap();
+        let fit = Fit::new(Kind::Illuminant).components(1).normalization(Normalization::Mean).fit(&data);
+        let message = fit.unwrap_err().to_string();
+        assert!(message.contains("spectrum 2 of b.csv") && !message.contains("a.csv"), "{message}");
+    }
+
     /// Finite, but not once they are centred, scaled or divided: a decomposition of such data would never end.
     #[test]
     fn data_at_the_ends_of_f64_are_refused() {

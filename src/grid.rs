@@ -38,6 +38,8 @@ pub enum GridError {
     NotAWavelength(f64),
     #[error("a step of {0} nm does not increase the wavelength")]
     Step(f64),
+    #[error("the grid ends at {stop} nm, before it starts at {start} nm: write start:step:stop")]
+    Reversed { start: f64, stop: f64 },
     #[error("{stop} nm is not a whole number of steps of {step} nm from {start} nm")]
     Uneven { start: f64, step: f64, stop: f64 },
     #[error("a grid of {0} bands: it needs 1 to {MAX_BANDS}")]
@@ -138,8 +140,11 @@ impl FromStr for Grid {
         };
         let (start, step, stop) = (*start, *step, *stop);
         Grid::new(start, step, 1)?;
-        if !(stop.is_finite() && stop >= start) {
+        if !stop.is_finite() {
             return Err(GridError::NotAWavelength(stop));
+        }
+        if stop < start {
+            return Err(GridError::Reversed { start, stop });
         }
         let steps = (stop - start) / step;
         if (steps - steps.round()).abs() > 1e-6 {
@@ -268,7 +273,7 @@ mod tests {
         for (text, message) in [
             ("400-700", "start:step:stop"),
             ("400:10", "start:step:stop"),
-            ("700:10:400", "not a wavelength"),
+            ("700:10:400", "ends at 400 nm, before it starts at 700 nm"),
             ("400:0:700", "does not increase"),
             ("400:-10:700", "does not increase"),
             ("400:7:700", "whole number of steps"),

@@ -59,9 +59,10 @@ pub use model::{MAX_COMPONENTS, Model, ModelError, Normalization, Parts};
 pub use normal::Real;
 pub use philox::philox;
 pub use program::{Bounds, Tally};
-pub use quantity::{Element, Format, Layout, Quantity};
+pub use quantity::{Element, Format, Interval, Layout, Quantity};
 pub use recipe::{
     DEFAULT_MAX_ATTEMPTS, Drawn, Intensity, Luminance, Proposal, Recipe, RecipeBuilder, RecipeError,
+    ScalarDrawer,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
 pub use stream::{Draws, Stream, StreamRng};

@@ -16,7 +16,7 @@ pub(crate) struct Asked {
     pub(crate) spectra: Element,
     /// The illuminant of reflectances, if it is not D65.
     pub(crate) light: Option<Vec<f64>>,
-    pub(crate) luminance: Luminance,
+    pub(crate) luminance: Option<Luminance>,
     /// The intensity of every draw, where it is the same.
     pub(crate) fixed: Option<f64>,
 }
@@ -28,7 +28,7 @@ impl Default for Asked {
             layout: Layout::default(),
             spectra: Element::F32,
             light: None,
-            luminance: Luminance::default(),
+            luminance: None,
             fixed: None,
         }
     }
@@ -46,6 +46,15 @@ pub(crate) fn outputs(
     quantities.dedup();
     if quantities.is_empty() {
         return Err(RecipeError::Nothing);
+    }
+    let has_colours = quantities.iter().any(|q| matches!(q, Quantity::Xyz | Quantity::Srgb));
+    if asked.light.is_some() && !(has_colours && model.kind() == Kind::Reflectance) {
+        let (setting, needs) = ("an illuminant to see surfaces under", "XYZ or sRGB of reflectances");
+        return Err(RecipeError::Pointless { setting, needs });
+    }
+    if asked.luminance.is_some() && !(has_colours && model.kind() == Kind::Illuminant) {
+        let (setting, needs) = ("a scale of tristimulus values", "XYZ or sRGB of illuminants");
+        return Err(RecipeError::Pointless { setting, needs });
     }
     let output = |quantity| {
         let source = source(quantity, asked, model, program, weights)?;
@@ -83,7 +92,7 @@ fn source(
         Quantity::Weights => Source::Map(weights.clone(), Unit::One),
         Quantity::Xyz | Quantity::Srgb => {
             let xyz = program.spectrum.project(&xyz_weights(asked, model)?);
-            let unit = match (model.kind(), asked.luminance) {
+            let unit = match (model.kind(), asked.luminance.unwrap_or_default()) {
                 (Kind::Illuminant, Luminance::One) => Unit::Over(xyz.value(1)),
                 _ => scaled,
             };

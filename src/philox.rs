@@ -15,6 +15,7 @@ pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
 /// vectorise. Words are kept in the low halves of 64 bits, as vector units multiply them; what the high halves hold
 /// counts for nothing, and is not cleared.
 #[inline(always)]
+#[allow(clippy::needless_range_loop)] // a lane is an index, of several arrays at once
 pub(crate) fn philox_in_lanes<const L: usize>(counters: [[u32; L]; 4], key: [u32; 2]) -> [[u32; L]; 4] {
     let mut c = [[0; L]; 4];
     for (wide, words) in c.iter_mut().zip(&counters) {

@@ -12,7 +12,7 @@ use std::iter;
 use crate::cover::{Cover, Proposal};
 use crate::dataset::Kind;
 use crate::model::Model;
-use crate::quantity::Format;
+use crate::quantity::{Format, Interval};
 
 /// What must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -214,6 +214,14 @@ impl Program {
     /// Whether spectra are scaled, by a target or a level.
     pub(crate) fn scales(&self) -> bool {
         self.target.is_some() || self.level.is_some()
+    }
+
+    /// What the values of spectra that come out are between.
+    pub(crate) fn interval(&self) -> Interval {
+        match self.kind {
+            Kind::Reflectance if !self.may_exceed_one() => Interval::Unit,
+            _ => Interval::Positive,
+        }
     }
 
     /// Whether the spectrum before scaling must be below 1.

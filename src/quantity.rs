@@ -70,6 +70,27 @@ pub enum Layout {
     Planes,
 }
 
+/// What the values of spectra are between. 16 bits could round them to an end: they are rounded to the nearest that is
+/// none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Interval {
+    /// Above 0.
+    Positive,
+    /// Above 0 and below 1.
+    Unit,
+}
+
+impl Interval {
+    /// The least half-precision number in it, and the largest; infinity where there is none.
+    pub(crate) fn halves(self) -> [f32; 2] {
+        match self {
+            Interval::Positive => [2f32.powi(-24), f32::INFINITY],
+            Interval::Unit => [2f32.powi(-24), 1.0 - 2f32.powi(-11)],
+        }
+    }
+}
+
 /// The type of a value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Element {

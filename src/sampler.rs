@@ -57,6 +57,10 @@ pub enum SamplerError {
          (max_storage_buffers_per_shader_stage): ask for fewer quantities at once"
     )]
     TooManyBuffers { buffers: u32, largest: u32 },
+    #[error(
+        "a range of {count} draws, where room for {prepared} was prepared: prepare the largest range first"
+    )]
+    NoRoom { count: u64, prepared: u64 },
 }
 
 /// What the shader reads as `Parameters`.
@@ -212,7 +216,8 @@ impl Sampler {
             layout: &self.pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        Ok(Prepared { sampler: self.clone(), bindings, parameters, outputs, count: draws.count })
+        let (count, prepared) = (draws.count, draws.count);
+        Ok(Prepared { sampler: self.clone(), bindings, parameters, outputs, count, prepared })
     }
 
     fn parameters(&self, draws: Draws) -> Parameters {
@@ -238,6 +243,8 @@ pub struct Prepared {
     /// In the order of the sampler's formats.
     outputs: Vec<wgpu::Buffer>,
     count: u64,
+    /// How many draws there is room for.
+    prepared: u64,
 }
 
 impl Prepared {
@@ -268,10 +275,32 @@ impl Prepared {
         &self.outputs
     }
 
-    /// Turns to other draws, no more than were prepared, in what the queue runs from its next submission on.
-    pub(crate) fn turn_to(&mut self, queue: &wgpu::Queue, draws: Draws) {
+    /// Goes on to other draws, at most as many as were prepared, in the same buffers: for a host that draws anew in each
+    /// frame. What is recorded already makes them too, from the queue's next submission on; two ranges in one submission
+    /// take two [`Sampler::prepare`].
+    ///
+    /// ```
+    /// use spectroll::{Model, Recipe, Sampler, Stream, wgpu};
+    ///
+    /// # fn host() -> Option<(wgpu::Device, wgpu::Queue)> { None }
+    /// # let Some((device, queue)) = host() else { return Ok(()) };
+    /// let recipe = Recipe::new(&Model::builtin("granada")?).build()?;
+    /// let mut lamps = Sampler::new(&device, &recipe)?.prepare(&device, Stream::new(0).draws(0..64))?;
+    /// for frame in 0..3 {
+    ///     lamps.set_draws(&queue, Stream::new(frame).draws(0..64))?;
+    ///     let mut encoder = device.create_command_encoder(&Default::default());
+    ///     lamps.record(&mut encoder);
+    ///     queue.submit([encoder.finish()]);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn set_draws(&mut self, queue: &wgpu::Queue, draws: Draws) -> Result<(), SamplerError> {
+        if draws.count > self.prepared {
+            return Err(SamplerError::NoRoom { count: draws.count, prepared: self.prepared });
+        }
         self.count = draws.count;
         queue.write_buffer(&self.parameters, 0, bytemuck::bytes_of(&self.sampler.parameters(draws)));
+        Ok(())
     }
 }
 

@@ -69,6 +69,31 @@ fn several_ranges_in_one_encoder_do_not_clash() {
     }
 }
 
+/// Frame after frame in the same buffers, with fewer draws at times.
+#[test]
+fn a_host_draws_anew_in_each_frame() {
+    let host = host::device();
+    let recipe = surfaces();
+    let sampler = Sampler::new(&host.0, &recipe).expect("two buffers are few");
+    let mut prepared = sampler.prepare(&host.0, Stream::new(1).draws(0..100)).expect("they are few");
+    let scalar = recipe.scalar::<f32>();
+    for (seed, count) in [(1, 100), (2, 37), (3, 100)] {
+        let draws = Stream::new(seed).draws(5..5 + count);
+        prepared.set_draws(&host.1, draws).expect("there is room");
+        let mut encoder = host.0.create_command_encoder(&Default::default());
+        prepared.record(&mut encoder);
+        let buffer = prepared.buffer(Quantity::Spectra).expect("it is asked for");
+        let words = read(&host, encoder, &[buffer]).remove(0);
+        for (i, row) in words.chunks_exact(31).take(count as usize).enumerate() {
+            let drawn = scalar.draw(draws.stream, draws.first + i as u64);
+            let close = |(a, b): (&u32, &f32)| (f32::from_bits(*a) - b).abs() < 1e-6;
+            assert!(row.iter().zip(drawn.spectrum()).all(close), "seed {seed}, draw {i}");
+        }
+    }
+    let error = prepared.set_draws(&host.1, Stream::new(4).draws(0..101)).unwrap_err();
+    assert_eq!(error, SamplerError::NoRoom { count: 101, prepared: 100 });
+}
+
 #[test]
 fn what_does_not_fit_is_refused_with_the_limit() {
     let (device, _) = host::device();

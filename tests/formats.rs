@@ -36,6 +36,31 @@ fn npz() {
     equals(folder.path(), load, "f['spectra']", "f['wavelengths']");
 }
 
+/// Rounded to 1 a reflectance would not be one any more; 1.7 % of these spectra have such a value.
+#[test]
+fn sixteen_bits_keep_spectra_physical() {
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(folder.path(), "sample munsell-vrhel -n 20000 --lrv 0.95 --bounds scaled --dtype f16 -o a.npy");
+    let code = "import numpy as np; a = np.load('a.npy'); print(a.dtype, (a > 0).all(), (a < 1).all(), a.max() == 1 - 2**-11)";
+    assert_eq!(python(folder.path(), code), "float16 True True True");
+    succeeds(folder.path(), "sample granada -n 1000 --intensity 1e-9..1e-8 --dtype f16 -o b.npy");
+    assert_eq!(python(folder.path(), "import numpy as np; print((np.load('b.npy') > 0).all())"), "True");
+    let bright = "sample granada -n 1000 --intensity 1e4..1e6 --dtype f16 -o c.npy";
+    fails(folder.path(), bright, 1, "do not fit float16, which ends at 65504: use float32");
+}
+
+/// Not the words that engines hold them in, which also say whether a value reached 1.
+#[test]
+fn attempts_are_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = "sample munsell-vrhel -n 2000 --lrv 0.6 --quantities attempts -o a.csv";
+    let (_, summary) = succeeds(folder.path(), drawn);
+    assert!(summary.contains("reach 1 or more"), "{summary}");
+    let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    let counts: Vec<u32> = text.lines().skip(1).map(|line| line.parse().unwrap()).collect();
+    assert!(counts.len() == 2000 && counts.iter().all(|count| (1..100).contains(count)), "{counts:?}");
+}
+
 #[test]
 fn hdf5() {
     let folder = tempfile::tempdir().unwrap();

@@ -125,7 +125,7 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
             "illuminant",
             "intensity",
             "intensity = { log_uniform = [150, 0.15] }",
-            &["line 8, intensity of \"lights\"", "the first must be below the second"],
+            &["line 8, intensity of \"lights\"", "the second must be above the first"],
         ),
         (
             "illuminant",

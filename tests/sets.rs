@@ -311,3 +311,24 @@ fn what_is_in_the_way_is_named() {
     succeeds(folder, &format!("{sample} -o empty.zarr").replace("-n 5", "-n 0"));
     succeeds(folder, "verify empty.zarr");
 }
+
+/// Neither sees a manifest of the other when it begins.
+#[test]
+fn of_two_runs_that_start_at_once_one_is_refused() {
+    for round in 0..6 {
+        let folder = tempfile::tempdir().unwrap();
+        let run = |seed: u32| {
+            spectroll(
+                folder.path(),
+                &format!("sample granada -n 300000 --seed {seed} --engine cpu -o x.zarr"),
+            )
+        };
+        let (first, second) = std::thread::scope(|scope| {
+            let other = scope.spawn(|| run(2));
+            (run(1), other.join().unwrap())
+        });
+        let succeeded = [&first, &second].into_iter().filter(|output| output.status.success()).count();
+        assert_eq!(succeeded, 1, "round {round}: {first:?} {second:?}");
+        succeeds(folder.path(), "verify x.zarr --engine cpu");
+    }
+}

@@ -1,5 +1,7 @@
 //! What is asked of a draw: the flags that say so, which are also what a data set records of them.
 
+use std::borrow::Cow;
+
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -168,7 +170,10 @@ fn intensity(text: &str) -> Result<IntensityName, String> {
 pub(super) fn schema(recipe: &Recipe, count: u64, stored: Element) -> Schema {
     let field = |format: spectroll::Format| {
         let axis = match format.quantity {
-            Quantity::Spectra => "wavelength",
+            Quantity::Spectra => {
+                let field = Field::vector("spectra", "wavelength", format.width, format.element);
+                return field.within(recipe.interval());
+            }
             Quantity::Weights => "component",
             Quantity::Xyz | Quantity::Srgb => "channel",
             Quantity::Lrv | Quantity::Attempts | Quantity::Intensity => {
@@ -187,9 +192,15 @@ pub(super) fn schema(recipe: &Recipe, count: u64, stored: Element) -> Schema {
     }
 }
 
-/// The columns of a window, as [`schema`] has them.
-pub(super) fn columns<'a>(recipe: &Recipe, batch: &Batch<'a>) -> Vec<&'a [u8]> {
-    recipe.formats().iter().map(|format| batch.bytes(format.quantity)).collect()
+/// The columns of a window, as [`schema`] has them: of tallies, the attempts.
+pub(super) fn columns<'a>(recipe: &Recipe, batch: &Batch<'a>) -> Vec<Cow<'a, [u8]>> {
+    let column = |quantity| match quantity {
+        Quantity::Attempts => {
+            batch.tallies().iter().flat_map(|tally| tally.attempts().to_ne_bytes()).collect::<Vec<_>>().into()
+        }
+        _ => Cow::Borrowed(batch.bytes(quantity)),
+    };
+    recipe.formats().iter().map(|format| column(format.quantity)).collect()
 }
 
 /// What draws are made from.
@@ -220,7 +231,7 @@ pub(super) fn attributes(
 pub(super) fn rounding(recipe: &Recipe, drawer: &mut Drawer) -> Result<String, EngineError> {
     let mut sum = Sum::default();
     drawer.draw(Stream::named(0, "rounding").draws(0..4096), |batch| {
-        columns(recipe, &batch).into_iter().for_each(|column| sum.update(column));
+        columns(recipe, &batch).iter().for_each(|column| sum.update(column));
         Ok::<_, EngineError>(())
     })?;
     Ok(sum.finish())

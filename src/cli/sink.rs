@@ -147,7 +147,7 @@ impl OutputArguments {
 
     /// A set of chunks of these draws.
     pub(super) fn plan(&self, layout: Layout, schema: &Schema) -> Plan {
-        let chunk = self.chunk.unwrap_or_else(|| Layout::default_chunk(schema.row_bytes()));
+        let chunk = self.chunk.unwrap_or_else(|| Layout::default_chunk(schema.row_bytes(), schema.count));
         Plan { layout, chunk, schema: schema.clone() }
     }
 

@@ -40,7 +40,7 @@ const BOXES: usize = 1024;
 
 /// The most components for which a cover is built. The time grows from 0.1 s for 6 to 0.3 s for 8 and 2 s for 12, and
 /// the acceptance falls: boxes fit a polytope worse the more corners they have.
-const COMPONENTS: usize = 12;
+pub(crate) const MOST_COMPONENTS: usize = 12;
 
 /// What making and judging a candidate of a cover costs, where one of plain rejection costs 1: 135 ns beside 69 ns on
 /// the CPU, for 6 components and 31 bands.
@@ -73,9 +73,9 @@ pub(crate) struct Estimate {
 
 impl Cover {
     /// The cover of what half-spaces accept, from a point within. `None` where it would be empty, or there are more
-    /// than [`COMPONENTS`].
+    /// than [`MOST_COMPONENTS`].
     pub(crate) fn new(half_spaces: &[HalfSpace], within: &[f64]) -> Option<Cover> {
-        (within.len() <= COMPONENTS).then(|| Cover::of_boxes(half_spaces, within, BOXES)).flatten()
+        (within.len() <= MOST_COMPONENTS).then(|| Cover::of_boxes(half_spaces, within, BOXES)).flatten()
     }
 
     /// Whether a cover could be cheaper than plain rejection that accepts this share of its candidates.

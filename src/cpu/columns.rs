@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::lanes::Done;
 use super::{Candidates, Kernel, Take, Value};
 use crate::program::Tally;
-use crate::quantity::{Element, Format, Layout};
+use crate::quantity::{Element, Format, Interval, Layout};
 use crate::stream::Draws;
 
 /// How many lanes the f32 engine has: a vector register of AVX-512, two of AVX2.
@@ -93,54 +93,67 @@ impl<const L: usize> Take<f32, L> for Filling<'_> {
                 continue;
             }
             let (values, unit) = candidates.output(number, &output.value);
-            column.put(&values[..output.format.width], &unit, done, &mut self.row, &mut self.halves);
+            let values = &values[..output.format.width];
+            match output.format.element {
+                Element::F16 => {
+                    let (row, halves) = (&mut self.row, &mut self.halves);
+                    column.put_halves(values, &unit, done, self.kernel.interval, row, halves);
+                }
+                _ => column.put(values, &unit, done, &mut self.row),
+            }
         }
     }
 }
 
 impl Column<'_> {
-    /// Stores the values of draws times their units, zeros where one failed. `row` and `halves` are those of [`Filling`].
-    fn put<const L: usize>(
+    /// Stores the values of draws times their units, zeros where one failed. `row` is that of [`Filling`].
+    fn put<const L: usize>(&mut self, values: &[[f32; L]], unit: &[f32; L], done: &[Done], row: &mut [f32]) {
+        let (stride, width) = (self.format.stride(), self.format.width);
+        if self.format.layout != Layout::Planes {
+            let rows = cast_slice_mut(self.planes[0]);
+            for done in done {
+                copy(values, unit, done, &mut rows[done.number * stride..][..width]);
+            }
+            return;
+        }
+        for done in done {
+            let row = &mut row[..width];
+            copy(values, unit, done, row);
+            for (plane, value) in self.planes.iter_mut().zip(&*row) {
+                plane[done.number] = value.to_bits();
+            }
+        }
+    }
+
+    /// The same in 16 bits, kept in an interval.
+    fn put_halves<const L: usize>(
         &mut self,
         values: &[[f32; L]],
         unit: &[f32; L],
         done: &[Done],
+        interval: Interval,
         row: &mut [f32],
         halves: &mut [f16],
     ) {
         let (stride, width) = (self.format.stride(), self.format.width);
-        match (self.format.layout, self.format.element) {
-            (Layout::Planes, Element::F16) => {
-                for done in done {
-                    let row = &mut row[..width];
-                    copy(values, unit, done, row);
-                    for (plane, &value) in self.planes.iter_mut().zip(&*row) {
-                        cast_slice_mut::<_, f16>(plane)[done.number] = f16::from_f32(value);
+        let [least, largest] = interval.halves();
+        let eights = width.next_multiple_of(8);
+        for done in done {
+            copy(values, unit, done, &mut row[..width]);
+            if done.tally != Tally::FAILED {
+                row[..width].iter_mut().for_each(|value| *value = value.clamp(least, largest));
+            }
+            halves[..eights].convert_from_f32_slice(&row[..eights]);
+            let halves = &halves[..width];
+            match self.format.layout {
+                Layout::Planes => {
+                    for (plane, half) in self.planes.iter_mut().zip(halves) {
+                        cast_slice_mut(plane)[done.number] = *half;
                     }
                 }
-            }
-            (Layout::Planes, _) => {
-                for done in done {
-                    let row = &mut row[..width];
-                    copy(values, unit, done, row);
-                    for (plane, value) in self.planes.iter_mut().zip(&*row) {
-                        plane[done.number] = value.to_bits();
-                    }
-                }
-            }
-            (_, Element::F16) => {
-                let rows = cast_slice_mut::<_, f16>(self.planes[0]);
-                let eights = width.next_multiple_of(8);
-                for done in done {
-                    copy(values, unit, done, &mut row[..width]);
-                    halves[..eights].convert_from_f32_slice(&row[..eights]);
-                    rows[done.number * stride..][..width].copy_from_slice(&halves[..width]);
-                }
-            }
-            _ => {
-                let rows = cast_slice_mut(self.planes[0]);
-                for done in done {
-                    copy(values, unit, done, &mut rows[done.number * stride..][..width]);
+                _ => {
+                    let rows = cast_slice_mut(self.planes[0]);
+                    rows[done.number * stride..][..width].copy_from_slice(halves);
                 }
             }
         }
@@ -277,8 +290,12 @@ mod tests {
                         }
                         Element::F16 => {
                             let halves: &[f16] = bytemuck::cast_slice(words);
-                            (0..format.width)
-                                .for_each(|j| assert_eq!(halves[at(j)], f16::from_f32(values[j])));
+                            let [least, largest] = kernel.interval.halves();
+                            for j in 0..format.width {
+                                let value = values[j];
+                                let kept = if value == 0.0 { 0.0 } else { value.clamp(least, largest) };
+                                assert_eq!(halves[at(j)], f16::from_f32(kept));
+                            }
                         }
                     }
                 }

@@ -9,6 +9,8 @@
 //! several levels of instructions, of which the best is chosen at run time; multiplications and additions are never
 //! fused, so all of them give the same bytes.
 
+#![allow(clippy::needless_range_loop)] // a lane is an index, of several arrays at once
+
 mod columns;
 mod lanes;
 
@@ -21,7 +23,7 @@ use crate::dataset::Kind;
 use crate::level::{self, Level};
 use crate::normal::Real;
 use crate::program::{self, Affine, Program, Source, Tally};
-use crate::quantity::Format;
+use crate::quantity::{Format, Interval};
 use crate::stream::{Attempts, Blocks, Draws, Stream};
 
 /// A [`Program`] with its numbers rounded to `R`.
@@ -35,13 +37,14 @@ pub(crate) struct Kernel<R> {
     tests_scaled: bool,
     may_exceed_one: bool,
     max_attempts: u32,
+    /// What the values of spectra are between.
+    interval: Interval,
     outputs: Vec<Output<R>>,
 }
 
 /// An [`Affine`] map of the normals, by four values: so many sums at once keep a core busy, and share what is read of
 /// the normals. The last value fills the last four up, so that it is no special case.
 struct Map<R> {
-    values: usize,
     offset: Vec<[R; 4]>,
     /// k gains for each four values.
     gain: Vec<[R; 4]>,
@@ -145,14 +148,15 @@ impl<R: Real> Kernel<R> {
             tests_scaled: program.tests_scaled(),
             may_exceed_one: program.may_exceed_one(),
             max_attempts: program.max_attempts,
+            interval: program.interval(),
             outputs: program.outputs.iter().map(output).collect(),
         }
     }
 
-    /// The number of bands.
+    /// How many values the first output has.
     #[cfg(feature = "report")]
-    pub(crate) fn bands(&self) -> usize {
-        self.spectrum.values
+    pub(crate) fn width(&self) -> usize {
+        self.outputs[0].format.width
     }
 
     /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
@@ -168,19 +172,24 @@ impl<R: Real> Kernel<R> {
         only.1.expect("one draw was asked for")
     }
 
-    /// The candidate of the words that `block` gives for each block, as the values of each output; `None` where it is
-    /// rejected.
-    pub(crate) fn candidate(&self, mut block: impl FnMut(u32) -> [u32; 4]) -> Option<Vec<Vec<R>>> {
+    /// The candidate of the words that `block` gives for each block, the `attempt`-th of its draw: the values of each
+    /// output, and what its draw took; `None` where it is rejected.
+    pub(crate) fn candidate(
+        &self,
+        attempt: u32,
+        mut block: impl FnMut(u32) -> [u32; 4],
+    ) -> Option<(Vec<Vec<R>>, Tally)> {
         let mut candidates = self.candidates::<1>();
         let kept = self.propose(&mut candidates, &mut block);
         let word = self.level.as_ref().map(|_| [block(level::BLOCK)[0]]);
         let verdicts = self.judge(&mut candidates, kept, word);
-        verdicts.accepted[0].then(|| self.values(&candidates, Tally::accepted(1, false)))
+        let tally = Tally::accepted(attempt, verdicts.above_one[0]);
+        verdicts.accepted[0].then(|| (self.values(&candidates, tally), tally))
     }
 
     /// Whether the candidate of those words is accepted.
     pub(crate) fn accepts(&self, block: impl FnMut(u32) -> [u32; 4]) -> bool {
-        self.candidate(block).is_some()
+        self.candidate(1, block).is_some()
     }
 
     fn values(&self, candidates: &Candidates<R, 1>, tally: Tally) -> Vec<Vec<R>> {
@@ -203,9 +212,10 @@ impl<R: Real> Kernel<R> {
         while lanes.are_busy() {
             let words = lanes.words();
             let kept = self.propose(&mut candidates, words);
-            let word = match self.level {
-                Some(_) => Some(Attempts { attempts: [0; L], ..words }.block(level::BLOCK)[0]),
-                None => None,
+            let word = if self.level.is_some() {
+                Some(Attempts { attempts: [0; L], ..words }.block(level::BLOCK)[0])
+            } else {
+                None
             };
             let verdicts = self.judge(&mut candidates, kept, word);
             to.take(lanes.advance(&verdicts, self.max_attempts), &candidates);
@@ -289,7 +299,7 @@ impl<R: Real> Map<R> {
     fn new(map: &Affine) -> Map<R> {
         let fours = |row: &[f64]| -> Vec<[R; 4]> {
             let four = |values: &[f64]| {
-                // No -0: see `forms` of src/wgsl.
+                // No -0: see `forms` of src/wgsl/arithmetic.rs.
                 std::array::from_fn(|i| R::from_f64(values[i.min(values.len() - 1)] + 0.0))
             };
             row.chunks(4).map(four).collect()
@@ -297,7 +307,7 @@ impl<R: Real> Map<R> {
         let gains: Vec<_> = map.gain.iter().map(|row| fours(row)).collect();
         let offset = fours(&map.offset);
         let gain = (0..offset.len()).flat_map(|i| gains.iter().map(move |row| row[i])).collect();
-        Map { values: map.offset.len(), offset, gain, components: map.gain.len() }
+        Map { offset, gain, components: map.gain.len() }
     }
 
     /// offset + gain . z, each value in the order of the components. Four values are made for each begun four.

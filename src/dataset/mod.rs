@@ -217,6 +217,8 @@ pub struct Dataset {
     /// A column a spectrum.
     spectra: DMatrix<f64>,
     sources: Vec<String>,
+    /// How many spectra each source has.
+    counts: Vec<usize>,
 }
 
 impl Dataset {
@@ -230,7 +232,8 @@ impl Dataset {
         let values = columns.iter().flat_map(|c| c.iter().copied());
         let spectra = DMatrix::from_iterator(grid.len(), count, values);
         let sources = tables.iter().map(|t| format!("{} ({} spectra)", t.source, t.len())).collect();
-        Ok(Dataset { grid, spectra, sources })
+        let counts = tables.iter().map(Table::len).collect();
+        Ok(Dataset { grid, spectra, sources, counts })
     }
 
     /// The wavelengths.
@@ -250,10 +253,13 @@ impl Dataset {
 
     /// The source of spectrum `index` and its number there, from 1: what a message should call it.
     pub(crate) fn place(&self, index: usize) -> String {
-        match self.sources.as_slice() {
-            [only] => format!("spectrum {} of {only}", index + 1),
-            all => format!("spectrum {} of {}", index + 1, all.join(" + ")),
-        }
+        let mut number = index;
+        let source = self.counts.iter().position(|&count| {
+            let is_here = number < count;
+            number -= if is_here { 0 } else { count };
+            is_here
+        });
+        format!("spectrum {} of {}", number + 1, self.sources[source.expect("the data have that many")])
     }
 }
 

@@ -224,7 +224,7 @@ impl Slot {
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("spectroll") };
         let mut encoder = gpu.device.create_command_encoder(&descriptor);
         for (prepared, draws) in self.prepared.iter_mut().zip(&draws) {
-            prepared.turn_to(&gpu.queue, *draws);
+            prepared.set_draws(&gpu.queue, *draws).expect("a window has no more steps than a slot");
             prepared.record(&mut encoder);
         }
         let drawn = self.prepared.iter().flat_map(Prepared::buffers);

@@ -141,7 +141,7 @@ impl Tables {
 
 impl Table {
     fn write(&mut self, column: &[u8]) -> Result<(), Hdf5Error> {
-        let stored = self.field.store(column);
+        let stored = self.field.store(column)?;
         let mut bytes = &*stored;
         while !bytes.is_empty() {
             let (part, after) = bytes.split_at(bytes.len().min(self.chunk - self.rest.len()));

@@ -72,6 +72,8 @@ pub enum OutputError {
     NoFolder { folder: PathBuf },
     #[error("cannot write {path:?}: {source}")]
     Write { path: PathBuf, source: io::Error },
+    #[error("cannot read {path:?}: {source}")]
+    Read { path: PathBuf, source: io::Error },
     #[error("{path:?}: {format} files hold {holds}; {remedy}")]
     Cannot { path: PathBuf, format: &'static str, holds: &'static str, remedy: &'static str },
     #[error("{path:?}: this build leaves out {what}: build it with --features {feature}")]

@@ -24,7 +24,7 @@ impl<W: Write> Npy<W> {
 impl<W: Write> Encoder for Npy<W> {
     fn write(&mut self, columns: &[&[u8]]) -> io::Result<()> {
         let [column] = columns else { unreachable!("the schema has one field") };
-        self.to.write_all(&self.field.store(column))
+        self.to.write_all(&self.field.store(column)?)
     }
 
     fn finish(mut self: Box<Self>) -> io::Result<()> {

@@ -81,7 +81,7 @@ impl<W: Write + Seek> Encoder for Npz<W> {
     fn write(&mut self, columns: &[&[u8]]) -> io::Result<()> {
         for (i, column) in columns.iter().enumerate() {
             let field = self.schema.fields[i].clone();
-            self.append(i, &field.store(column))?;
+            self.append(i, &field.store(column)?)?;
         }
         Ok(())
     }

@@ -82,7 +82,7 @@ impl<W: Write + Send> Encoder for Parquet<W> {
             let part = (rows - done).min(self.group_rows - self.rows);
             for ((field, column), group) in self.schema.fields.iter().zip(columns).zip(&mut self.group) {
                 let size = field.delivered_bytes();
-                group.extend_from_slice(&field.store(&column[done * size..(done + part) * size]));
+                group.extend_from_slice(&field.store(&column[done * size..(done + part) * size])?);
             }
             (done, self.rows) = (done + part, self.rows + part);
             if self.rows == self.group_rows {

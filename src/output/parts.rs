@@ -14,7 +14,7 @@ pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Resul
         .zip(columns)
         .map(|(field, column)| {
             let shape = field.shape((column.len() / field.delivered_bytes()) as u64);
-            let bytes = npy::file(npy::type_string(field.stored), &shape, &field.store(column))?;
+            let bytes = npy::file(npy::type_string(field.stored), &shape, &field.store(column)?)?;
             Ok(Part { name: format!("{}-{index:06}.npy", field.name), bytes: bytes.into() })
         })
         .collect()

@@ -11,7 +11,7 @@ use super::OutputError;
 /// What the names of temporary files begin with.
 pub(super) const PREFIX: &str = ".spectroll-";
 
-const SUFFIX: &str = ".partial";
+pub(super) const SUFFIX: &str = ".partial";
 
 /// What to do where something of the name exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

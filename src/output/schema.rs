@@ -1,12 +1,13 @@
 //! What a data set holds: columns of numbers, a row a draw, whatever they mean.
 
 use std::borrow::Cow;
+use std::io;
 
 use half::f16;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::quantity::Element;
+use crate::quantity::{Element, Interval};
 
 /// The value that bytes hold, as f64, which holds every one of these exactly.
 fn read(element: Element, bytes: &[u8]) -> f64 {
@@ -34,6 +35,9 @@ pub struct Field {
     pub element: Element,
     /// The type that they are written as.
     pub stored: Element,
+    /// What they are between, and stay between when they are rounded; `None` where that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<Interval>,
 }
 
 impl Field {
@@ -44,7 +48,8 @@ impl Field {
 
     /// A quantity of one value a draw.
     pub fn scalar(name: &str, element: Element) -> Field {
-        Field { name: name.to_owned(), axis: None, outer: None, width: 1, element, stored: element }
+        let name = name.to_owned();
+        Field { name, axis: None, outer: None, width: 1, element, stored: element, interval: None }
     }
 
     /// The same for `count` rows a draw.
@@ -58,6 +63,11 @@ impl Field {
             self.stored = stored;
         }
         self
+    }
+
+    /// The same, with values in an interval.
+    pub fn within(self, interval: Interval) -> Field {
+        Field { interval: Some(interval), ..self }
     }
 
     /// The bytes of one draw as delivered.
@@ -89,20 +99,18 @@ impl Field {
         self.axis.is_some() || self.outer.is_some()
     }
 
-    /// Values as delivered, as they are to be written.
-    pub(super) fn store<'a>(&self, bytes: &'a [u8]) -> Cow<'a, [u8]> {
+    /// Values as delivered, as they are to be written. An error says what does not fit the type.
+    pub(super) fn store<'a>(&self, bytes: &'a [u8]) -> io::Result<Cow<'a, [u8]>> {
         if self.element == self.stored {
-            return Cow::Borrowed(bytes);
+            return Ok(Cow::Borrowed(bytes));
         }
         let values = bytes.chunks_exact(self.element.size());
         let mut out = Vec::with_capacity(values.len() * self.stored.size());
         match (self.element, self.stored) {
-            (Element::F32, Element::F16) => values.for_each(|v| {
-                let value = f32::from_le_bytes(v.try_into().expect("four bytes"));
-                out.extend_from_slice(&f16::from_f32(value).to_le_bytes());
-            }),
             (from, Element::F16) => {
-                values.for_each(|v| out.extend_from_slice(&f16::from_f64(read(from, v)).to_le_bytes()));
+                for value in values.map(|v| read(from, v)) {
+                    out.extend_from_slice(&self.half(value)?.to_le_bytes());
+                }
             }
             (from, Element::F32) => {
                 values.for_each(|v| out.extend_from_slice(&(read(from, v) as f32).to_le_bytes()));
@@ -110,7 +118,18 @@ impl Field {
             (from, Element::F64) => values.for_each(|v| out.extend_from_slice(&read(from, v).to_le_bytes())),
             (_, Element::U32) => unreachable!("no float is written as an integer"),
         }
-        Cow::Owned(out)
+        Ok(Cow::Owned(out))
+    }
+
+    fn half(&self, value: f64) -> io::Result<f16> {
+        let [least, largest] = self.interval.map_or([f32::NEG_INFINITY, f32::INFINITY], Interval::halves);
+        let half = f16::from_f64(value.clamp(least.into(), largest.into()));
+        if half.is_infinite() && value.is_finite() {
+            let (name, most) = (&self.name, f16::MAX);
+            let what = format!("{name} of {value:e} do not fit float16, which ends at {most}: use float32");
+            return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+        }
+        Ok(half)
     }
 
     /// The values of delivered bytes.
@@ -134,7 +153,7 @@ pub struct Constant {
     pub bytes: Vec<u8>,
 }
 
-/// What is made from one description has the same values.
+/// Ignores the values, which a manifest does not hold: those of one description are the same.
 impl PartialEq for Constant {
     fn eq(&self, other: &Constant) -> bool {
         (&self.name, &self.axes, self.element) == (&other.name, &other.axes, other.element)
@@ -210,13 +229,13 @@ mod tests {
         let field = Field::vector("x", "wavelength", 2, Element::F32);
         let values = [0.1f32, 1.0, 65504.0, 1e-7];
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        assert!(matches!(field.store(&bytes), Cow::Borrowed(_)));
+        assert!(matches!(field.store(&bytes), Ok(Cow::Borrowed(_))));
         let double = field.clone().stored_as(Element::F64);
         let expected: Vec<u8> = values.iter().flat_map(|&v| f64::from(v).to_le_bytes()).collect();
-        assert_eq!(*double.store(&bytes), expected);
+        assert_eq!(*double.store(&bytes).unwrap(), expected);
         let half = field.stored_as(Element::F16);
         let expected: Vec<u8> = values.iter().flat_map(|&v| f16::from_f32(v).to_le_bytes()).collect();
-        assert_eq!(*half.store(&bytes), expected);
+        assert_eq!(*half.store(&bytes).unwrap(), expected);
         assert_eq!(half.shape(5), [5, 2]);
         let attempts = Field::scalar("attempts", Element::U32).stored_as(Element::F16);
         assert_eq!((attempts.stored, attempts.shape(5)), (Element::U32, vec![5]));

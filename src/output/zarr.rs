@@ -28,7 +28,7 @@ pub(super) fn chunk<'a>(
         .iter()
         .zip(columns)
         .map(|(field, column)| {
-            let mut bytes = field.store(column);
+            let mut bytes = field.store(column)?;
             let size = rows as usize * field.stored_bytes();
             if bytes.len() < size {
                 bytes.to_mut().resize(size, 0);

@@ -13,7 +13,7 @@ use crate::model::Model;
 use crate::outputs::{Asked, outputs};
 use crate::program::{self, Affine, Bounds, Level, Program, Target};
 use crate::quantity::{Element, Layout, Quantity};
-use crate::region::{self, Room};
+use crate::region::{self, HalfSpace, Room};
 use crate::stream::Stream;
 
 /// How many candidates estimate the acceptance before any work starts.
@@ -25,7 +25,7 @@ pub struct RecipeBuilder {
     model: Model,
     lrv: Option<f64>,
     xyz: Option<[f64; 3]>,
-    bounds: Bounds,
+    bounds: Option<Bounds>,
     covariance_scale: f64,
     intensity: Option<Intensity>,
     proposal: Proposal,
@@ -39,7 +39,7 @@ impl RecipeBuilder {
             model: model.clone(),
             lrv: None,
             xyz: None,
-            bounds: Bounds::default(),
+            bounds: None,
             covariance_scale: 1.0,
             intensity: None,
             proposal: Proposal::default(),
@@ -48,7 +48,8 @@ impl RecipeBuilder {
         }
     }
 
-    /// What comes out, besides nothing: unless said, [`Quantity::Spectra`]. Engines add [`Quantity::Attempts`].
+    /// The quantities that come out, at least one; [`Quantity::Spectra`] unless said. Engines add
+    /// [`Quantity::Attempts`].
     pub fn quantities(mut self, quantities: impl IntoIterator<Item = Quantity>) -> Self {
         self.outputs.quantities = quantities.into_iter().collect();
         self
@@ -60,7 +61,10 @@ impl RecipeBuilder {
         self
     }
 
-    /// Spectra in 16 bits, rounded to nearest and ties to even; other quantities stay in 32.
+    /// Spectra in 16 bits, rounded to nearest and ties to even, but never to an end of their [`Interval`]; above 65,504
+    /// they are infinite. Other quantities stay in 32 bits.
+    ///
+    /// [`Interval`]: crate::Interval
     pub fn half_spectra(mut self) -> Self {
         self.outputs.spectra = Element::F16;
         self
@@ -74,7 +78,7 @@ impl RecipeBuilder {
 
     /// The scale of an illuminant's XYZ and sRGB ([`Luminance::Absolute`]).
     pub fn luminance(mut self, luminance: Luminance) -> Self {
-        self.outputs.luminance = luminance;
+        self.outputs.luminance = Some(luminance);
         self
     }
 
@@ -105,9 +109,9 @@ impl RecipeBuilder {
         RecipeBuilder { xyz: Some(xyz), ..self }
     }
 
-    /// What must lie between 0 and 1 where there is a target LRV.
+    /// What must lie between 0 and 1 where there is a target LRV ([`Bounds::Base`]).
     pub fn bounds(self, bounds: Bounds) -> Self {
-        RecipeBuilder { bounds, ..self }
+        RecipeBuilder { bounds: Some(bounds), ..self }
     }
 
     /// Multiplies the weights' covariance.
@@ -128,15 +132,35 @@ impl RecipeBuilder {
     /// The recipe, if it can be drawn: its values make sense, a linear program finds room for a spectrum, and a pilot
     /// run finds enough of it.
     pub fn build(self) -> Result<Recipe, RecipeError> {
+        let program = self.program()?;
+        let half_spaces = region::half_spaces(&program);
+        let centre = self.centre(&program, &half_spaces)?;
+        let max_attempts = program.max_attempts;
+        let recipe = self.propose(program, &half_spaces, centre)?;
+        if failure(recipe.acceptance, max_attempts) > TOLERABLE_FAILURE {
+            return Err(RecipeError::Hopeless { acceptance: recipe.acceptance, max_attempts });
+        }
+        Ok(recipe)
+    }
+
+    /// The program of plain rejection.
+    fn program(&self) -> Result<Program, RecipeError> {
         if !(self.covariance_scale.is_finite() && self.covariance_scale >= 0.0) {
             return Err(RecipeError::CovarianceScale(self.covariance_scale));
         }
         if self.max_attempts == 0 || self.max_attempts > i32::MAX as u32 {
             return Err(RecipeError::MaxAttempts(self.max_attempts));
         }
+        if self.bounds.is_some() && self.lrv.is_none() {
+            let (setting, needs) = ("a choice of bounds", "a target luminous reflectance");
+            return Err(RecipeError::Pointless { setting, needs });
+        }
         let target = self.lrv.map(|lrv| self.target(lrv)).transpose()?;
         let mut weights = program::weights(&self.model, self.covariance_scale);
         if let Some(xyz) = self.xyz {
+            if !(xyz.iter().all(|v| v.is_finite()) && xyz[1] > 0.0 && xyz[1] < 1.0) {
+                return Err(RecipeError::Xyz(xyz));
+            }
             weights = self.condition(&weights)?.given(xyz, &weights);
         }
         let mut program = Program { max_attempts: self.max_attempts, ..Program::new(&self.model, &weights) };
@@ -148,76 +172,70 @@ impl RecipeBuilder {
         }
         check_scale(&program)?;
         program.outputs = outputs(&asked, &self.model, &program, &weights)?;
+        Ok(program)
+    }
+
+    /// The middle of what the rule of a program accepts; `None` where that is for the pilot run to find out.
+    fn centre(&self, program: &Program, half_spaces: &[HalfSpace]) -> Result<Option<Vec<f64>>, RecipeError> {
         if let Some(target) = &program.target {
-            let largest = region::largest_lrv(&program, &target.weights);
+            let largest = region::largest_lrv(program, &target.weights);
             if let Some(largest) = largest.filter(|&largest| target.lrv >= largest) {
                 return Err(RecipeError::UnreachableLrv { lrv: target.lrv, largest });
             }
         }
-        let half_spaces = region::half_spaces(&program);
-        let within = match region::room(&half_spaces) {
-            Room::None { bands } => {
-                if let Some(xyz) = self.xyz {
-                    return Err(RecipeError::UnreachableXyz { xyz, nearest: self.nearest(xyz) });
-                }
+        match (region::room(half_spaces), self.xyz) {
+            (Room::Ball { centre, .. }, _) => Ok(Some(centre)),
+            (Room::Unknown, _) => Ok(None),
+            (Room::None { .. }, Some(xyz)) => {
+                Err(RecipeError::UnreachableXyz { xyz, nearest: self.nearest(xyz) })
+            }
+            (Room::None { bands }, None) => {
                 let wavelengths = bands.into_iter().map(|band| self.model.grid().wavelength(band)).collect();
-                return Err(RecipeError::Empty { wavelengths });
+                Err(RecipeError::Empty { wavelengths })
             }
-            Room::Ball { centre, .. } => Some(centre),
-            Room::Unknown => None, // which the pilot run will tell
-        };
-        let plain = match self.proposal {
-            Proposal::Cover => 0.0,
-            Proposal::Auto | Proposal::Plain => pilot(&program),
-        };
-        let cover = match within {
-            Some(within) if self.proposal == Proposal::Cover || self.may_cover(plain) => {
-                Cover::new(&half_spaces, &within)
-            }
-            _ => None,
-        };
-        if self.proposal == Proposal::Cover && cover.is_none() {
-            return Err(RecipeError::NoCover { components: program.components() });
         }
-        let covered = cover.map(|cover| (program.clone().covered(&cover), cover));
-        let covered = covered.map(|(program, cover)| (pilot(&program), program, cover));
-        let covered = covered.filter(|(acceptance, ..)| Cover::pays(*acceptance, plain));
-        let recipe = match covered {
-            Some((acceptance, program, cover)) => Recipe {
-                model: self.model,
-                program,
-                probability: acceptance * cover.mass(),
-                acceptance,
-                cover: Some((cover.len(), cover.proposal().bytes())),
-            },
-            None => Recipe { model: self.model, program, probability: plain, acceptance: plain, cover: None },
-        };
-        if failure(recipe.acceptance, self.max_attempts) > TOLERABLE_FAILURE {
-            let acceptance = recipe.acceptance;
-            return Err(RecipeError::Hopeless { acceptance, max_attempts: self.max_attempts });
-        }
-        Ok(recipe)
     }
 
-    /// Whether a cover is to be tried.
-    fn may_cover(&self, plain: f64) -> bool {
-        self.proposal == Proposal::Auto && Cover::could_pay(plain)
+    /// The recipe with the proposal that was asked for, or is expected to cost less.
+    fn propose(
+        self,
+        program: Program,
+        half_spaces: &[HalfSpace],
+        centre: Option<Vec<f64>>,
+    ) -> Result<Recipe, RecipeError> {
+        let (may_be_plain, may_be_covered) = match self.proposal {
+            Proposal::Auto => (true, true),
+            Proposal::Plain => (true, false),
+            Proposal::Cover => (false, true),
+        };
+        let plain = if may_be_plain { pilot(&program) } else { 0.0 };
+        if may_be_covered
+            && (!may_be_plain || Cover::could_pay(plain))
+            && let Some(cover) = centre.and_then(|centre| Cover::new(half_spaces, &centre))
+        {
+            let covered = program.clone().covered(&cover);
+            let acceptance = pilot(&covered);
+            if Cover::pays(acceptance, plain) {
+                let probability = acceptance * cover.mass();
+                let cover = Some((cover.len(), cover.proposal().bytes()));
+                return Ok(Recipe { model: self.model, program: covered, probability, acceptance, cover });
+            }
+        } else if !may_be_plain {
+            return Err(RecipeError::NoCover { components: program.components() });
+        }
+        Ok(Recipe { model: self.model, program, probability: plain, acceptance: plain, cover: None })
     }
 
     /// What giving the tristimulus values does to this model.
     pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
-        let [_, y, _] = self.xyz.unwrap_or([0.5; 3]);
-        if let Some(xyz) = self.xyz.filter(|xyz| !(xyz.iter().all(|v| v.is_finite()) && y > 0.0 && y < 1.0)) {
-            return Err(RecipeError::Xyz(xyz));
-        }
         if self.model.kind() == Kind::Illuminant {
             return Err(RecipeError::XyzOfIlluminant);
         }
         if self.lrv.is_some() {
             return Err(RecipeError::XyzAndLrv);
         }
-        let (_, xyz) = self.seen(weights)?;
-        Condition::new(&xyz).ok_or(RecipeError::TooFewDirections)
+        let (_, map) = self.seen(weights)?;
+        Condition::new(&map).ok_or(RecipeError::TooFewDirections)
     }
 
     /// The program without a target, and the map of its tristimulus values under D65.
@@ -281,7 +299,7 @@ impl RecipeBuilder {
         }
         let grid = self.model.grid();
         let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
-        Ok(Target { lrv, weights, bounds: self.bounds })
+        Ok(Target { lrv, weights, bounds: self.bounds.unwrap_or_default() })
     }
 }
 
@@ -293,12 +311,13 @@ fn check_scale(program: &Program) -> Result<(), RecipeError> {
     let size = |b: usize| gain.iter().fold(offset[b].abs(), |a, gain| a.max(gain[b].abs()));
     let sizes = || (0..program.bands()).map(size);
     let (least, largest) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
-    let low = if program.target.is_some() { 1e-20 } else { 1e-30 };
-    if !(low..1e30).contains(&largest) {
-        return Err(RecipeError::Scale(largest));
+    let (low, high) = (if program.target.is_some() { 1e-20 } else { 1e-30 }, 1e30);
+    if !(low..high).contains(&largest) {
+        return Err(RecipeError::Scale { value: largest, low, high });
     }
-    let is_lost = least > 0.0 && least < f64::from(f32::MIN_POSITIVE);
-    if is_lost { Err(RecipeError::Scale(least)) } else { Ok(()) }
+    let low = f64::from(f32::MIN_POSITIVE);
+    let is_lost = least > 0.0 && least < low;
+    if is_lost { Err(RecipeError::Scale { value: least, low, high }) } else { Ok(()) }
 }
 
 /// The share of accepted candidates, of a stream of its own. In f32, as draws are made: what passes in f64 may have no

@@ -1,6 +1,7 @@
 //! Why a recipe cannot be drawn.
 
 use super::builder::PILOT;
+use crate::cover::MOST_COMPONENTS;
 use crate::grid::Grid;
 use crate::quantity::Quantity;
 
@@ -14,7 +15,7 @@ pub(super) const TOLERABLE_FAILURE: f64 = 1e-12;
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum RecipeError {
     #[error(
-        "a target luminous reflectance of {0}: it must be above 0 and below 1, where 1 is a perfect white, and 1e-30 at least"
+        "a target luminous reflectance of {0}: it must be above 0 and below 1, which is a perfect white; the least is 1e-30"
     )]
     Lrv(f64),
     #[error("a target luminous reflectance belongs to reflectances, and this model is of illuminants")]
@@ -36,10 +37,10 @@ pub enum RecipeError {
     TooFewDirections,
     #[error("{}", unreachable_xyz(*xyz, *nearest))]
     UnreachableXyz { xyz: [f64; 3], nearest: Option<[f64; 3]> },
-    #[error("an intensity of {0}: it must be above 0, finite and within what f32 holds")]
+    #[error("an intensity of {0}: it must be above 0, from 1e-30 to 1e30")]
     Intensity(f64),
     #[error(
-        "an intensity between {low} and {high}: the first must be below the second, and no more than 2^126 below"
+        "an intensity between {low} and {high}: the second must be above the first, and at most 2^126 times it"
     )]
     IntensityRange { low: f64, high: f64 },
     #[error("an intensity belongs to illuminants, and this model is of reflectances")]
@@ -62,17 +63,20 @@ pub enum RecipeError {
     CovarianceScale(f64),
     #[error("a draw needs at least 1 attempt and at most 2147483647, not {0}")]
     MaxAttempts(u32),
-    #[error("the model's values reach {0:e}, beyond what f32 holds: fit it to rescaled or normalised data")]
-    Scale(f64),
+    #[error(
+        "the model has values of {value:e} where draws in f32 need {low:e} to {high:e}: fit it to rescaled or \
+         normalised data"
+    )]
+    Scale { value: f64, low: f64, high: f64 },
     #[error(
         "no spectrum of this model obeys the rule: the bounds at {} leave no room",
         nanometres(wavelengths)
     )]
     Empty { wavelengths: Vec<f64> },
-    #[error(
-        "what is acceptable cannot be covered: covers are for models of up to 12 components, and this one has {components}"
-    )]
+    #[error("{}", no_cover(*components))]
     NoCover { components: usize },
+    #[error("{setting} would change nothing without {needs}: leave it out, or ask for that")]
+    Pointless { setting: &'static str, needs: &'static str },
     #[error("too few candidates would be accepted: {}", hopeless(*acceptance, *max_attempts))]
     Hopeless { acceptance: f64, max_attempts: u32 },
 }
@@ -92,6 +96,16 @@ fn hopeless(acceptance: f64, max_attempts: u32) -> String {
          allow at least {needed:.0} attempts, or ask for less extreme spectra",
         1.0 / failure(acceptance, max_attempts)
     )
+}
+
+fn no_cover(components: usize) -> String {
+    match components > MOST_COMPONENTS {
+        true => format!(
+            "covers are for models of up to {MOST_COMPONENTS} components, and this one has {components}: let plain \
+             rejection propose, or fit fewer"
+        ),
+        false => "no cover was found for what this rule accepts: let plain rejection propose".to_owned(),
+    }
 }
 
 fn unreachable_xyz(xyz: [f64; 3], nearest: Option<[f64; 3]>) -> String {

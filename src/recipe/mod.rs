@@ -3,20 +3,18 @@
 
 mod builder;
 mod error;
+mod scalar;
 
 pub use builder::RecipeBuilder;
 pub use error::RecipeError;
-
-use rand::Rng;
-use rand::distr::Distribution;
+pub use scalar::{Drawn, ScalarDrawer};
 
 use crate::colorimetry;
-use crate::cpu::Kernel;
 use crate::dataset::Kind;
 use crate::model::Model;
 use crate::normal::Real;
-use crate::program::{self, Program, Tally};
-use crate::quantity::{Format, Quantity};
+use crate::program::{self, Program};
+use crate::quantity::{Format, Interval};
 use crate::region;
 use crate::stream::Stream;
 use crate::wgsl::{self, TextError};
@@ -118,15 +116,24 @@ impl Recipe {
         self.cover
     }
 
+    /// What the values of its spectra are between.
+    pub fn interval(&self) -> Interval {
+        self.program.interval()
+    }
+
     /// What comes out, and how it lies in memory, in the order of [`Quantity`].
     pub fn formats(&self) -> Vec<Format> {
         self.program.outputs.iter().map(|output| output.format).collect()
     }
 
-    /// Draw `index` of a stream, on the CPU: in f32 as the shader makes it, in f64 without its rounding errors.
+    /// Gets ready to draw one at a time, on the CPU: for a few draws, for tests, and for code that lives in `rand`.
+    pub fn scalar<R: Real>(&self) -> ScalarDrawer<R> {
+        ScalarDrawer::new(self)
+    }
+
+    /// Draw `index` of a stream, as [`ScalarDrawer::draw`] makes it, which is what to use for more than one.
     pub fn draw<R: Real>(&self, stream: Stream, index: u64) -> Drawn<R> {
-        let (values, tally) = Kernel::new(&self.program).draw(stream, index);
-        Drawn { tally, values: self.program.outputs.iter().map(|o| o.format.quantity).zip(values).collect() }
+        self.scalar().draw(stream, index)
     }
 
     /// The draw as a WGSL module without bindings or entry points, for shaders of a host on any version of wgpu or any
@@ -159,58 +166,11 @@ impl Recipe {
     }
 }
 
-/// One draw. See [`Recipe::draw`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct Drawn<R> {
-    tally: Tally,
-    values: Vec<(Quantity, Vec<R>)>,
-}
-
-impl<R> Drawn<R> {
-    /// What it took.
-    pub fn tally(&self) -> Tally {
-        self.tally
-    }
-
-    /// The values of a quantity, all 0 where the draw failed. None for [`Quantity::Attempts`], which
-    /// [`Drawn::tally`] has, nor for what the recipe does not ask for.
-    pub fn values(&self, quantity: Quantity) -> &[R] {
-        self.values.iter().find(|(q, _)| *q == quantity).map_or(&[], |(_, values)| values)
-    }
-
-    /// The spectrum, a value for each band, if the recipe asks for it.
-    pub fn spectrum(&self) -> &[R] {
-        self.values(Quantity::Spectra)
-    }
-}
-
-/// Draws for code that lives in `rand`: the words come from any generator, two for each two normals, rather than from
-/// a counter; everything else is the same. A spectrum has a value for each band. See also [`Stream::rng`].
-///
-/// ```
-/// use rand::distr::Distribution;
-/// use spectroll::{Model, Recipe, Stream};
-///
-/// let recipe = Recipe::new(&Model::builtin("granada")?).build()?;
-/// let daylights: Vec<Vec<f32>> = recipe.sample_iter(Stream::new(7).rng()).take(3).collect();
-/// assert!(daylights.iter().flatten().all(|&power| power > 0.0));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-impl<R: Real> Distribution<Vec<R>> for Recipe {
-    fn sample<G: Rng + ?Sized>(&self, rng: &mut G) -> Vec<R> {
-        let kernel = Kernel::new(&self.program.spectra_alone());
-        // A recipe that could loop here for long could not be built.
-        loop {
-            if let Some(mut values) = kernel.candidate(|_| [(); 4].map(|()| rng.next_u32())) {
-                return values.swap_remove(0);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::program::Bounds;
+    use crate::quantity::Quantity;
 
     fn message(recipe: RecipeBuilder) -> String {
         recipe.build().unwrap_err().to_string()
@@ -235,6 +195,9 @@ mod tests {
             (surface.clone().xyz([0.3, f64::NAN, 0.3]), "must be finite"),
             (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
             (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
+            (surface.clone().bounds(Bounds::Both), "without a target luminous reflectance"),
+            (surface.clone().light(&[1.0; 31]), "without XYZ or sRGB of reflectances"),
+            (surface.clone().luminance(Luminance::One).quantities([Quantity::Xyz]), "of illuminants"),
         ] {
             let text = message(recipe);
             assert!(text.contains(part), "{text}");
@@ -270,7 +233,7 @@ mod tests {
     fn values_beyond_f32_are_refused() {
         let mut parts = Model::builtin("granada").unwrap().parts().clone();
         parts.mean *= 1e35;
-        assert!(message(Recipe::new(&Model::new(parts).unwrap())).contains("beyond what f32 holds"));
+        assert!(message(Recipe::new(&Model::new(parts).unwrap())).contains("where draws in f32 need"));
     }
 
     /// Frozen, so that a changed stream is a decision and not an accident.

@@ -18,7 +18,6 @@ use crate::model::Model;
 use crate::normal::Real;
 use crate::program::Tally;
 use crate::recipe::Recipe;
-use crate::statistics::exact;
 use crate::stream::{Draws, Stream};
 
 /// Numerical error against cost.
@@ -115,6 +114,16 @@ struct Judge<'a> {
     xyz: [Vec<f64>; 3],
 }
 
+/// The spectra of draws on the CPU, and what each took.
+fn scalar_draws<R: Real>(recipe: &Recipe, draws: Draws) -> Vec<(Vec<R>, Tally)> {
+    let drawer = recipe.scalar::<R>();
+    let draw = |i| {
+        let drawn = drawer.draw(draws.stream, draws.first + i);
+        (drawn.spectrum().to_vec(), drawn.tally())
+    };
+    (0..draws.count).into_par_iter().map(draw).collect()
+}
+
 /// The errors of a draw.
 struct Difference {
     spectrum: f64,
@@ -126,18 +135,14 @@ struct Difference {
 
 impl<'a> Judge<'a> {
     fn new(recipe: &'a Recipe, draws: Draws) -> Judge<'a> {
-        let exact = (0..draws.count).into_par_iter().map(|i| exact(recipe, draws.stream, draws.first + i));
-        Judge { recipe, draws, exact: exact.collect(), xyz: xyz_weights(recipe.model()) }
+        Judge { recipe, draws, exact: scalar_draws(recipe, draws), xyz: xyz_weights(recipe.model()) }
     }
 
     /// The same draws in another arithmetic on the CPU.
     fn scalar<R: Real + Into<f32>>(&self) -> (Vec<f32>, Vec<Tally>) {
-        let draw = |i| {
-            let (spectrum, tally) = exact::<R>(self.recipe, self.draws.stream, self.draws.first + i);
-            (spectrum.into_iter().map(Into::into).collect::<Vec<f32>>(), tally)
-        };
-        let (spectra, tallies): (Vec<_>, Vec<_>) = (0..self.draws.count).into_par_iter().map(draw).unzip();
-        (spectra.concat(), tallies)
+        let (spectra, tallies): (Vec<_>, Vec<_>) =
+            scalar_draws::<R>(self.recipe, self.draws).into_iter().unzip();
+        (spectra.into_iter().flatten().map(Into::into).collect(), tallies)
     }
 
     fn variant(&self, name: &str, values: &[f32], tallies: &[Tally]) -> Variant {

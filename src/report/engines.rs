@@ -135,7 +135,7 @@ fn contents<'b>(batch: &'b Batch) -> (&'b [f32], &'b [Tally]) {
 
 /// Draws in f64, on all cores.
 pub(super) fn fill(kernel: &Kernel<f64>, draws: Draws, values: &mut Vec<f64>, tallies: &mut Vec<Tally>) {
-    let bands = kernel.bands();
+    let bands = kernel.width();
     values.resize(draws.count as usize * bands, 0.0);
     tallies.resize(draws.count as usize, Tally::FAILED);
     let rows = values.par_chunks_exact_mut(bands).zip(tallies).enumerate();

@@ -6,6 +6,7 @@ use crate::condition::Condition;
 use crate::cpu::Kernel;
 use crate::dataset::Kind;
 use crate::level;
+use crate::normal::Real;
 use crate::program::{self, Affine, Program, Tally, Target};
 use crate::recipe::{Proposal, Recipe, RecipeBuilder, RecipeError};
 use crate::stream::Stream;
@@ -56,11 +57,11 @@ impl Aimed {
         };
         let builder = Recipe::new(model)
             .covariance_scale(targets.base.covariance_scale)
-            .max_attempts(targets.base.max_attempts)
-            .bounds(targets.bounds);
+            .max_attempts(targets.base.max_attempts);
         let built = |recipe: Result<Recipe, RecipeError>| recipe.map_err(|e| (key(&e), Problem::Recipe(e)));
         match &targets.aim {
             Aim::Lrv(levels) => {
+                let builder = builder.bounds(targets.bounds);
                 // The lightest is the hardest to accept, for what is within bounds there is within them at all levels.
                 // What proposes for one level need not do for another, unless it is the model's own Gaussian.
                 let largest = match levels {
@@ -130,7 +131,7 @@ impl Aimed {
     pub(super) fn draw(&self, stream: Stream, scene: u64, element: u32) -> Drawn {
         let row = u64::from(stream.row());
         let at = |scene: u64| scene * row + u64::from(element);
-        let uniform = |word: usize| uniform(stream.block(at(scene), 0, level::BLOCK)[word]);
+        let uniform = |word: usize| f64::uniform(stream.block(at(scene), 0, level::BLOCK)[word]);
         let number = |count: usize| (scene % count as u64) as usize;
         match self {
             Aimed::Levels { kernels, levels } => {
@@ -197,11 +198,6 @@ impl Hue {
 fn drawn(kernel: &Kernel<f32>, stream: Stream, index: u64, lrv: f64) -> Drawn {
     let (mut values, tally) = kernel.draw(stream, index);
     Drawn { spectrum: values.swap_remove(0), lrv: lrv as f32, xyz: None, tally: Some(tally) }
-}
-
-/// (x + 1/2) 2^-32: between 0 and 1, and neither.
-fn uniform(word: u32) -> f64 {
-    (f64::from(word) + 0.5) * 2f64.powi(-32)
 }
 
 fn built_condition(builder: &RecipeBuilder, weights: &Affine) -> Result<Condition, (&'static str, Problem)> {

@@ -55,6 +55,8 @@ pub enum Problem {
     Scenes(u64),
     #[error("{0:?} is no name for a group: use letters, digits, - and _, a letter first")]
     Name(String),
+    #[error("{0:?} is what data sets call an array of their own: use another name")]
+    Reserved(String),
     #[error("two groups are called {0:?}: rename one, for its draws depend on its name")]
     SameName(String),
     #[error("the arrays of {0:?} and of this group would have one name: rename one of them")]

@@ -61,6 +61,9 @@ pub use group::{Aim, Copies, Group, Hue, Illuminants, Levels, Sharing, Surfaces,
 pub use outline::{GroupOutline, Outline};
 pub use record::{PreparedScene, SceneSampler};
 
+/// What data sets call arrays that are not a group's, in one format or another.
+const RESERVED: [&str; 7] = ["wavelength", "wavelengths", "attributes", "X", "S_X", "data", "comment"];
+
 /// What a data set of scenes has in each of them.
 pub struct Scene {
     scenes: u64,
@@ -170,6 +173,9 @@ impl SceneBuilder {
                 && letters.all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
             if !is_name {
                 return fault("name", Problem::Name(name.clone()));
+            }
+            if RESERVED.contains(&name.as_str()) {
+                return fault("name", Problem::Reserved(name.clone()));
             }
             let id = |name: &str| Stream::named(0, name).id();
             for other in self.groups[..number].iter().map(|other| &other.base().name) {

@@ -18,8 +18,8 @@ pub use checks::{Against, CHECKS, Check, EDGE, FALSE_ALARMS, GAUSSIAN, LOW_BITS,
 pub use checks::{Smallest, sigmas, smallest_errors};
 pub use generator::{Group, normals, of_all, uniformity};
 pub use oracle::sample as oracle;
+pub(crate) use sample::rows;
 pub use sample::{Draw, Sample, Scenario};
-pub(crate) use sample::{exact, rows};
 pub use tinted::tinted;
 
 use crate::stream::Stream;

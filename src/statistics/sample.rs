@@ -6,7 +6,6 @@ use super::tinted::tinted;
 use crate::dataset::Kind;
 use crate::engine::{Batch, Engine, EngineError};
 use crate::model::Model;
-use crate::normal::Real;
 use crate::program::{Bounds, Tally};
 use crate::recipe::Recipe;
 use crate::stream::Stream;
@@ -133,10 +132,10 @@ impl<'a> Sample<'a> {
 
     /// The f64 draws of the library.
     pub fn of_library(scenario: &'a Scenario, stream: Stream, first: u64, count: u64) -> Sample<'a> {
-        let recipe = scenario.recipe();
+        let oracle = scenario.recipe().scalar();
         Sample::of(scenario, first, count, |index| {
-            let (spectrum, tally) = exact(&recipe, stream, index);
-            (spectrum, tally.attempts())
+            let drawn = oracle.draw(stream, index);
+            (drawn.spectrum().to_vec(), drawn.tally().attempts())
         })
     }
 
@@ -151,10 +150,4 @@ impl<'a> Sample<'a> {
 pub(crate) fn rows<'b>(batch: &'b Batch) -> impl Iterator<Item = (&'b [f32], Tally)> {
     let bands = batch.formats()[0].width;
     batch.spectra().chunks_exact(bands).zip(batch.tallies().iter().copied())
-}
-
-/// A draw on the CPU: in f64 without the rounding errors of f32, or in another arithmetic.
-pub(crate) fn exact<R: Real>(recipe: &Recipe, stream: Stream, index: u64) -> (Vec<R>, Tally) {
-    let drawn = recipe.draw(stream, index);
-    (drawn.spectrum().to_vec(), drawn.tally())
 }

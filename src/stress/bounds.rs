@@ -79,7 +79,7 @@ fn outside(engine: &Engine) -> Answer {
 fn drawn_or_refused(engine: &Engine, builder: RecipeBuilder, bound: f64) -> Answer {
     use RecipeError::{Empty, Hopeless, Lrv, Scale, UnreachableLrv};
     match builder.clone().build() {
-        Err(Lrv(_) | Scale(_)) => good("refused, beyond f32"),
+        Err(Lrv(_) | Scale { .. }) => good("refused, beyond f32"),
         Err(e @ (Empty { .. } | Hopeless { .. } | UnreachableLrv { .. })) => {
             good(format!("refused: {}", first_sentence(&e.to_string())))
         }

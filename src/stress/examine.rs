@@ -12,7 +12,7 @@ use crate::grid::Grid;
 use crate::model::{Model, Normalization, Parts};
 use crate::program::{Bounds, Tally};
 use crate::recipe::{Recipe, RecipeBuilder, RecipeError};
-use crate::statistics::{exact, rows};
+use crate::statistics::rows;
 use crate::stream::{Draws, Stream};
 
 /// Draws of a case.
@@ -111,17 +111,19 @@ pub(super) fn examine(engine: &Engine, recipe: &Recipe, draws: Draws) -> Result<
         return Err(format!("a value of {value:e}, which is not physical"));
     }
     let size = size(recipe);
+    let oracle = recipe.scalar::<f64>();
     let rows = spectra.par_chunks_exact(recipe.model().bands()).zip(&tallies).enumerate();
     let errors: Vec<_> = rows
         .map(|(i, (row, tally))| {
             let index = draws.first.wrapping_add(i as u64);
-            let (spectrum, exact_tally) = exact::<f64>(recipe, draws.stream, index);
-            if exact_tally.attempts() != tally.attempts() {
+            let exact = oracle.draw(draws.stream, index);
+            if exact.tally().attempts() != tally.attempts() {
                 return None;
             }
+            let spectrum = exact.spectrum();
             let peak = || spectrum.iter().copied().fold(0.0, f64::max);
             let size = if program.target.is_some() { peak() } else { size };
-            let errors = row.iter().zip(&spectrum).map(|(&a, b)| (f64::from(a) - b).abs() / size);
+            let errors = row.iter().zip(spectrum).map(|(&a, b)| (f64::from(a) - b).abs() / size);
             let lrv = program.target.as_ref().map_or(0.0, |target| {
                 let lrv: f64 = target.weights.iter().zip(row).map(|(w, &s)| w * f64::from(s)).sum();
                 (lrv / target.lrv - 1.0).abs()

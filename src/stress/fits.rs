@@ -81,7 +81,9 @@ fn raw_units(engine: &Engine) -> Answer {
                 return Err(format!("the model is {apart:.1e} from the scaled one of plain units"));
             }
             match Recipe::new(&model).build() {
-                Err(RecipeError::Scale(_)) if !(1e-20..1e20).contains(&scale) => good("refused, beyond f32"),
+                Err(RecipeError::Scale { .. }) if !(1e-20..1e20).contains(&scale) => {
+                    good("refused, beyond f32")
+                }
                 _ => drawn(engine, Recipe::new(&model), ERROR),
             }
         });
@@ -97,7 +99,7 @@ fn dark(engine: &Engine) -> Answer {
         let answer = fit(Kind::Reflectance, Normalization::None, &times(&spectra, scale)).and_then(|model| {
             let builder = target(&model, 0.4, crate::program::Bounds::Scaled);
             let recipe = match builder.build() {
-                Err(RecipeError::Scale(_)) => return good("refused, beyond f32"),
+                Err(RecipeError::Scale { .. }) => return good("refused, beyond f32"),
                 other => other.map_err(|e| format!("refused: {e}"))?,
             };
             let draws = crate::stream::Stream::named(3, "stress").draws(0..DRAWS);

@@ -9,7 +9,7 @@ use crate::dataset::Kind;
 use crate::engine::Engine;
 use crate::model::{Model, ModelError};
 use crate::recipe::Recipe;
-use crate::statistics::{exact, tinted};
+use crate::statistics::tinted;
 use crate::stream::Stream;
 
 pub(super) const CASES: &[Case] = &[
@@ -58,10 +58,11 @@ fn stiff(engine: &Engine) -> Answer {
 
 /// Whether draws in f64 have these variances along the columns of `turn`.
 fn directions(model: &Model, turn: &DMatrix<f64>, variances: &[f64]) -> Result<(), String> {
-    let recipe = build(Recipe::new(model))?;
+    let oracle = build(Recipe::new(model))?.scalar::<f64>();
     let weights: Vec<_> = (0..DRAWS)
         .into_par_iter()
-        .map(|i| turn.transpose() * model.project(&exact::<f64>(&recipe, Stream::named(2, "stress"), i).0))
+        .map(|i| oracle.draw(Stream::named(2, "stress"), i))
+        .map(|drawn| turn.transpose() * model.project(drawn.spectrum()))
         .collect();
     for (i, &variance) in variances.iter().enumerate() {
         let found = weights.iter().map(|w| w[i] * w[i]).sum::<f64>() / DRAWS as f64;

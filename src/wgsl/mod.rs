@@ -131,7 +131,8 @@ fn functions(program: &Program, tables: &Tables, target: Target) -> String {
     let is = |word: &str| match word {
         "scaled" => program.scales(),
         "covered" => program.proposal.is_some(),
-        _ => program.proposal.is_none(),
+        "plain" => program.proposal.is_none(),
+        other => unreachable!("draw.wgsl has a line for programs that are {other:?}"),
     };
     let line = |line: &str| match line.rsplit_once(" // if ") {
         Some((line, word)) => is(word).then(|| line.to_owned() + "\n"),

@@ -5,7 +5,7 @@ use super::text::Text;
 use super::{Form, OUTPUTS_AT, Target, draws_per_thread};
 use crate::normal::Real;
 use crate::program::{Output, Program, Source, Tally, Unit};
-use crate::quantity::{Element, Format, Layout};
+use crate::quantity::{Element, Format, Interval, Layout};
 
 /// How the values of an output make words of its buffer.
 #[derive(Clone, Copy, PartialEq)]
@@ -142,6 +142,10 @@ impl Store<'_> {
             }
             Source::Tally => return format!("{d}.attempts"),
         };
+        let value = match (&output.source, output.format.element) {
+            (Source::Spectrum, Element::F16) => within(value, self.program.interval()),
+            _ => value,
+        };
         format!("select(0f, {value}, ok_{d})")
     }
 
@@ -231,6 +235,15 @@ impl Store<'_> {
                 }
             }
         }
+    }
+}
+
+/// A value that is about to be rounded to 16 bits, kept where that leaves it in the interval.
+fn within(value: String, interval: Interval) -> String {
+    let [least, largest] = interval.halves();
+    match largest.is_finite() {
+        true => format!("clamp({value}, {least:?}f, {largest:?}f)"),
+        false => format!("max({value}, {least:?}f)"),
     }
 }
 

@@ -140,7 +140,7 @@ impl Manifest {
 
     /// All that is known of a set that is not sealed; `None` where nothing is.
     pub(super) fn joined(root: &Path) -> Result<Option<Manifest>, OutputError> {
-        let failed = |source| OutputError::Write { path: root.to_owned(), source };
+        let failed = |source| OutputError::Read { path: root.to_owned(), source };
         let mut joined: Option<Manifest> = None;
         for path in manifests(root).map_err(failed)? {
             let Some(part) = read(&path)? else { continue };

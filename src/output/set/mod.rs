@@ -59,9 +59,9 @@ pub(super) struct Part<'a> {
 }
 
 impl Layout {
-    /// How many draws a chunk of such rows has, unless asked otherwise: a power of two.
-    pub fn default_chunk(row_bytes: u64) -> u64 {
-        1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2()
+    /// How many of `count` draws of such rows a chunk has, unless asked otherwise: a power of two, or all.
+    pub fn default_chunk(row_bytes: u64, count: u64) -> u64 {
+        (1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2()).min(count.max(1))
     }
 
     /// The files of a chunk.
@@ -201,6 +201,7 @@ impl SetWriter {
             writer.manifest.engines.insert(engine.to_owned());
         }
         if writer.root != writer.path {
+            seal::claim(&writer.path, &writer.root, shard, start)?;
             for folder in writer.plan.layout.folders(&writer.plan) {
                 fs::create_dir_all(writer.root.join(folder)).map_err(failed)?;
             }
@@ -337,8 +338,10 @@ mod tests {
     }
 
     #[test]
-    fn a_chunk_is_a_power_of_two_of_draws() {
-        assert_eq!(Layout::default_chunk(124), 1 << 17);
-        assert_eq!(Layout::default_chunk(1 << 40), 1);
+    fn a_chunk_is_a_power_of_two_of_draws_or_all() {
+        assert_eq!(Layout::default_chunk(124, 1 << 40), 1 << 17);
+        assert_eq!(Layout::default_chunk(1 << 40, 10), 1);
+        assert_eq!(Layout::default_chunk(124, 10), 10);
+        assert_eq!(Layout::default_chunk(124, 0), 1);
     }
 }

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::super::OutputError;
-use super::super::pending::{PREFIX, folder, place_by, sweep, sync_folder};
+use super::super::pending::{PREFIX, SUFFIX, folder, place_by, sweep, sync_folder};
 use super::manifest::{Manifest, SEALED, manifests, part_name, remove_parts};
 use super::{Plan, Shard, Start};
 
@@ -54,7 +54,7 @@ pub(super) fn occupy(path: &Path, plan: &Plan, shard: Shard, start: Start) -> Re
     }
     let root = partial(path);
     match fs::create_dir(&root) {
-        Ok(()) => return Ok(root),
+        Ok(()) => {}
         Err(e) if e.kind() == io::ErrorKind::AlreadyExists && root.is_dir() => {}
         Err(e) => return Err(failed(e)),
     }
@@ -69,6 +69,22 @@ pub(super) fn occupy(path: &Path, plan: &Plan, shard: Shard, start: Start) -> Re
         Start::New | Start::Again | Start::Resume => {}
     }
     Ok(root)
+}
+
+/// Claims a shard of a set that begins, which one process can: of two that start at once, neither sees a manifest of
+/// the other. The name is one that sealing sweeps.
+pub(super) fn claim(path: &Path, root: &Path, shard: Shard, start: Start) -> Result<(), OutputError> {
+    let name = format!("{PREFIX}{}{SUFFIX}", part_name(shard.index, shard.count));
+    match fs::File::create_new(root.join(name)) {
+        Ok(_) => Ok(()),
+        Err(e) if e.kind() != io::ErrorKind::AlreadyExists => {
+            Err(OutputError::Write { path: path.to_owned(), source: e })
+        }
+        Err(_) if start == Start::New => {
+            Err(OutputError::Unfinished { path: path.to_owned(), root: root.to_owned() })
+        }
+        Err(_) => Ok(()), // that of a run that was killed
+    }
 }
 
 /// Seals a set of which other processes have made the chunks.
