@@ -102,7 +102,10 @@ fn what_is_in_the_way_of_a_file_stays() {
     fails(folder.path(), "sample granada -n 5 -o old.npy", 1, "exists already");
     fails(folder.path(), "sample granada -n 5 -o folder.npy", 1, "is a folder");
     fails(folder.path(), "sample granada -n 5 -o no/such/x.npy", 1, "create it first");
-    fails(folder.path(), "sample granada -n 5 -o x.xlsx", 1, "name it .npy, .npz, .csv");
+    fails(folder.path(), "sample granada -n 5 -o x.xlsx", 2, "name it .npy, .npz, .csv");
+    let several = "sample granada -n 5 --quantities spectra,xyz -o x.npy";
+    fails(folder.path(), several, 2, "choose one with --quantities");
+    fails(folder.path(), "sample granada -n 5 --format npy -o -", 2, "standard output takes CSV only");
     fails(folder.path(), "sample granada -n 5 -o - --json", 2, "both write to standard output");
     fails(folder.path(), "sample granada -n 5 --force --format npy -o /dev/null", 1, "not a plain file");
     assert_eq!(fs::read_to_string(folder.path().join("old.npy")).unwrap(), "mine");
@@ -210,7 +213,7 @@ fn scenes_are_drawn_planned_and_pictured() {
     let (text, _) = succeeds(folder.path(), "scene --example condition2");
     fs::write(path("mine.toml"), text).unwrap();
     let (plan, _) = succeeds(folder.path(), "scene mine.toml --dry-run --engine gpu");
-    for part in ["lights: 3 a scene, by kernel 1", "background: [999, 31]", "1 kernel compiled", "left out"] {
+    for part in ["lights: 3 a scene, by shader 1", "background: [999, 31]", "1 shader compiled", "left out"] {
         assert!(plan.contains(part), "{plan}");
     }
     for name in ["a.npz", "a.zarr", "a.h5", "a.mat", "a.parquet", "parts/ --format npy"] {
@@ -221,7 +224,7 @@ fn scenes_are_drawn_planned_and_pictured() {
     assert!(csv.starts_with("target_0_400,target_0_410,") && csv.lines().count() == 4, "{csv}");
     let (json, _) = succeeds(folder.path(), "scene mine.toml --scenes 0..5 -o b.npz --json --engine cpu");
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
-    assert_eq!((json["draws"].as_u64(), json["kernels"].as_u64()), (Some(5 * 4 + 999), Some(0)));
+    assert_eq!((json["draws"].as_u64(), json["shaders"].as_u64()), (Some(5 * 4 + 999), Some(0)));
     succeeds(folder.path(), "scene mine.toml --preview a.png --engine cpu");
     succeeds(folder.path(), "scene mine.toml --preview a.png --force --engine cpu");
     for (arguments, code, message) in [
@@ -232,6 +235,20 @@ fn scenes_are_drawn_planned_and_pictured() {
         ("absent.toml -o x.npz", 2, "cannot read the scene file"),
         ("--example condition9 -o x.npz", 2, "condition1, condition2, condition3"),
         ("mine.toml --preview a.png", 1, "exists already"),
+        ("mine.toml -o x.npy", 2, "choose one with --arrays"),
+        ("mine.toml --dry-run -o x.npy", 2, "choose one with --arrays"),
+        ("mine.toml --format spd -o x/", 2, "choose one group's spectra with --arrays"),
+        (
+            "mine.toml --arrays light -o x.npy",
+            2,
+            "no array \"light\", did you mean \"lights\"?; there are lights,",
+        ),
+        // What cannot be written is found out before a picture is made.
+        ("mine.toml --preview new.png -o x.xlsx", 2, "name it .npy"),
+        ("mine.toml --preview new.png -o a.npz", 1, "exists already"),
+        ("mine.toml --preview new.png -o no/such.npz", 1, "create it first"),
+        ("mine.toml --preview new.jpg -o x.npz", 2, ".svg or a .png"),
+        ("mine.toml --preview a.png -o x.npz", 1, "exists already"),
     ] {
         fails(folder.path(), &format!("scene {arguments}"), code, message);
     }
@@ -246,6 +263,38 @@ fn scenes_are_drawn_planned_and_pictured() {
                 assert (b == a['background']).all() and (b == np.load('parts/background.npy')).all()";
     let output = Command::new(python).args(["-c", code]).current_dir(folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// One array makes a file of formats that hold one, and is what it is among the others.
+#[test]
+fn arrays_of_scenes_are_written_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let scene = "scene --example condition2 --scenes 3..5 --engine cpu";
+    succeeds(folder.path(), &format!("{scene} --arrays lights -o lights.npy"));
+    succeeds(folder.path(), &format!("{scene} --arrays target_lrv,target -o some.npz"));
+    succeeds(folder.path(), &format!("{scene} --arrays lights --format spd -o lights/"));
+    succeeds(folder.path(), &format!("{scene} --arrays background -o background.npy"));
+    succeeds(folder.path(), &format!("{scene} -o all.npz"));
+    let (plan, _) = succeeds(folder.path(), &format!("{scene} --arrays lights --dry-run"));
+    assert!(plan.contains("lights: [2, 3, 31]") && !plan.contains("background:"), "{plan}");
+    let (shape, lights) = npy(&path("lights.npy"));
+    assert_eq!(shape, [2, 3, 31]);
+    assert_eq!(npy(&path("background.npy")).0, [2, 999, 31]);
+
+    // Numbered from 1, those of the scenes before counted: scene 3 begins with the tenth.
+    let names: Vec<_> = (10..16).map(|number| format!("illuminance_{number:03}.spd")).collect();
+    assert_eq!(files(&path("lights")), names);
+    for (name, light) in names.iter().zip(lights.chunks(31)) {
+        let text = fs::read_to_string(path("lights").join(name)).unwrap();
+        let values: Vec<f32> =
+            text.lines().map(|line| line.split(' ').nth(1).unwrap().parse().unwrap()).collect();
+        assert_eq!(values, light);
+    }
+    let code = "import numpy as np; a, s = np.load('all.npz'), np.load('some.npz'); \
+                assert 'background' not in s and 'lights' not in s; \
+                assert (s['target'] == a['target']).all() and (np.load('lights.npy') == a['lights']).all()";
+    program::python(folder.path(), code);
 }
 
 #[test]

@@ -289,8 +289,8 @@ fn a_host_records_the_same_scenes() {
 
 #[test]
 fn what_is_left_out_is_said() {
-    let kernels = |name| preset(name).outline(1000).kernels;
-    assert_eq!([kernels("condition1"), kernels("condition2"), kernels("condition3")], [0, 1, 2]);
+    let shaders = |name| preset(name).outline(1000).shaders;
+    assert_eq!([shaders("condition1"), shaders("condition2"), shaders("condition3")], [0, 1, 2]);
     let outline = preset("condition1").outline(1000);
     assert_eq!(outline.draws, 3 + 999 + 1000);
     let text = outline.left_out.join("\n");
@@ -301,10 +301,10 @@ fn what_is_left_out_is_said() {
         .build()
         .expect("it is possible")
         .outline(10);
-    assert_eq!(shared.kernels, 1);
+    assert_eq!(shared.shaders, 1);
     let text = shared.left_out.join("\n");
     assert!(
-        text.contains("b: no kernel of its own") && text.contains("illuminants: the scene has none"),
+        text.contains("b: no shader of its own") && text.contains("illuminants: the scene has none"),
         "{text}"
     );
 }

@@ -177,17 +177,80 @@ fn a_flipped_bit_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     succeeds(folder, "sample granada -n 500 --chunk 500 --engine cpu -o a.zarr");
-    let chunk = folder.join("a.zarr/spectra/c.0.0");
-    let mut bytes = fs::read(&chunk).unwrap();
-    let before = blake3::hash(&bytes).to_hex().to_string();
-    bytes[1000] ^= 1;
-    fs::write(&chunk, &bytes).unwrap();
-    let manifest = folder.join("a.zarr/manifest.json");
-    let text = fs::read_to_string(&manifest).unwrap();
-    fs::write(&manifest, text.replace(&before, blake3::hash(&bytes).to_hex().as_str())).unwrap();
+    forge(&folder.join("a.zarr"), "spectra/c.0.0");
     succeeds(folder, "verify a.zarr --redraw 0");
     fails(folder, "verify a.zarr", 5, "is not what is drawn now");
     fails(folder, "verify .", 1, "has no manifest");
+}
+
+/// Gives a file of a set other bytes, and the manifest their sum.
+fn forge(set: &Path, name: &str) {
+    let path = set.join(name);
+    let mut bytes = fs::read(&path).unwrap();
+    let before = blake3::hash(&bytes).to_hex().to_string();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&path, &bytes).unwrap();
+    let manifest = set.join("manifest.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace(&before, blake3::hash(&bytes).to_hex().as_str())).unwrap();
+}
+
+#[test]
+fn sets_of_scenes_are_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scene = "scene --example condition3 --scenes 2..12 --chunk 4 --engine cpu";
+    for (flags, set) in [
+        ("", "a.zarr"),
+        ("--dtype f64 --zstd", "b.zarr"),
+        ("--format npy", "c/"),
+        ("--format parquet", "d/"),
+        ("--only target", "e.zarr"),
+        ("--arrays lights,target_lrv", "f.zarr"),
+    ] {
+        succeeds(folder, &format!("{scene} {flags} -o {set}"));
+        let (_, err) = succeeds(folder, &format!("verify {set} --redraw 1"));
+        assert!(err.contains("3 of 3 chunks") && err.contains("3 of them drawn again"), "{set}: {err}");
+    }
+    forge(&folder.join("a.zarr"), "lights/c.1.0.0");
+    succeeds(folder, "verify a.zarr --redraw 0");
+    fails(folder, "verify a.zarr --redraw 1", 5, "lights/c.1.0.0 is not what is drawn now");
+    let flipped = folder.join("f.zarr/lights/c.2.0.0");
+    let mut bytes = fs::read(&flipped).unwrap();
+    bytes[7] ^= 8;
+    fs::write(&flipped, bytes).unwrap();
+    fails(folder, "verify f.zarr --redraw 0", 5, "does not match its BLAKE3 sum");
+
+    // What all scenes share is in no sum, and only drawing it again tells.
+    succeeds(folder, "scene --example condition2 --scenes 0..3 --engine cpu -o g.zarr");
+    succeeds(folder, "verify g.zarr");
+    let shared = folder.join("g.zarr/background/c.0.0");
+    let mut bytes = fs::read(&shared).unwrap();
+    bytes[7] ^= 8;
+    fs::write(&shared, bytes).unwrap();
+    fails(folder, "verify g.zarr", 5, "background/c.0.0 is not what is drawn now");
+}
+
+/// A set has its scene file, but not the models that lie beside that.
+#[test]
+fn scenes_of_models_that_are_not_at_hand_have_their_sums_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::create_dir(folder.join("files")).unwrap();
+    succeeds(folder, "fit munsell -k 3 -o files/m.json");
+    let scene = "scenes = 9\n[[surface]]\nname = \"wall\"\nmodel = \"m.json\"\ncount = 5\n";
+    fs::write(folder.join("files/s.toml"), scene).unwrap();
+    succeeds(folder, "scene files/s.toml --engine cpu -o a.zarr");
+    let (_, err) = succeeds(folder, "verify a.zarr --files files");
+    assert!(err.contains("1 of them drawn again"), "{err}");
+    let (_, err) = succeeds(folder, "verify a.zarr");
+    for part in ["1 of 1 chunks are as", "none of them drawn again", "\"m.json\" is neither", "--files"] {
+        assert!(err.contains(part), "{err}");
+    }
+    succeeds(folder, "fit munsell -k 4 -o files/m.json --force");
+    let (_, err) = succeeds(folder, "verify a.zarr --files files");
+    assert!(err.contains("the model or the mean of \"wall\" in \"files\" is not that of the set"), "{err}");
 }
 
 /// A disk of 3 MB. Where no file system may be mounted, there is nothing to see.

@@ -13,8 +13,10 @@ mod preview;
 mod progress;
 mod report;
 mod request;
+mod run;
 mod sample;
 mod scene;
+mod scene_rows;
 mod shader;
 mod shard;
 mod sink;
@@ -36,7 +38,7 @@ use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, 
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// A file of flags, as in `count = 1000`; flags beside it win
+    /// Take flags from a TOML file, as in `count = 1000`; those on the command line win over it
     #[arg(long, global = true, value_name = "FILE.toml")]
     config: Option<String>,
 }
@@ -168,6 +170,10 @@ fn run(command: Command) -> anyhow::Result<()> {
 }
 
 fn exit_code(error: &anyhow::Error) -> u8 {
+    let is_request = |e: &OutputError| {
+        use OutputError::{Cannot, NotBuilt, UnknownFormat};
+        matches!(e, UnknownFormat { .. } | Cannot { .. } | NotBuilt { .. })
+    };
     let is_missing = |e: &EngineError| matches!(e, EngineError::NoAdapter { .. } | EngineError::NoAdapters);
     if error.is::<Interrupted>() {
         130
@@ -181,6 +187,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         || error.is::<SceneError>()
         || error.is::<TextError>()
         || error.is::<Usage>()
+        || error.downcast_ref::<OutputError>().is_some_and(is_request)
     {
         2
     } else {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressStyle};
-use spectroll::report::{Effort, Options, Report, ReportError, figures, measure, page};
+use spectroll::report::{Effort, Options, Report, ReportError, Verdict, figures, measure, page};
 use spectroll::{Choice, adapters};
 
 use super::{EngineArguments, Interrupted, Usage, check_interrupt, model, watch_interrupts};
@@ -68,7 +68,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if report.verdict().is_good() {
         return Ok(());
     }
-    anyhow::bail!("something is wrong: see above, and the page")
+    anyhow::bail!("{}; {:?} has them all", failures(report.verdict()), arguments.output.join("report.html"))
+}
+
+/// What a verdict that is not good says is wrong.
+fn failures(Verdict { cases, checks, answers }: Verdict) -> String {
+    let parts = [
+        (cases, "stiff and extreme cases have a wrong answer"),
+        (checks, "checks of distributions raise an alarm"),
+        (answers, "known answers of the generator are missed"),
+    ];
+    let failed = parts.iter().filter(|([good, all], _)| good < all);
+    failed.map(|([good, all], what)| format!("{} of {all} {what}", all - good)).collect::<Vec<_>>().join("; ")
 }
 
 /// Every adapter and the CPU, unless one was asked for.
@@ -167,5 +178,19 @@ fn check(path: &Path, force: bool) -> anyhow::Result<()> {
             Err(anyhow!("{path:?} exists already: choose another name, or pass --force to replace a report"))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_failed_is_named() {
+        let verdict = Verdict { cases: [34, 36], checks: [500, 500], answers: [2, 3] };
+        assert_eq!(
+            failures(verdict),
+            "2 of 36 stiff and extreme cases have a wrong answer; 1 of 3 known answers of the generator are missed"
+        );
     }
 }

@@ -27,7 +27,7 @@ pub(super) struct Request {
     /// Multiply illuminants: a number, LOW..HIGH (uniform in the logarithm), or data (what the model's were divided by)
     #[arg(long, value_name = "I", value_parser = intensity)]
     intensity: Option<IntensityName>,
-    /// What comes out
+    /// The quantities that are given of each draw
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", default_value = "spectra")]
     quantities: Vec<QuantityName>,
     /// The illuminant of reflectances' XYZ and sRGB
@@ -36,7 +36,7 @@ pub(super) struct Request {
     /// Give illuminants' XYZ and sRGB with Y = 1
     #[arg(long)]
     unit_luminance: bool,
-    /// Where candidates come from
+    /// The distribution that candidates are drawn from
     #[arg(long, value_enum, default_value = "auto")]
     proposal: ProposalName,
     /// How many candidates a draw may take
@@ -62,7 +62,7 @@ enum ProposalName {
     Auto,
     /// The model's Gaussian
     Plain,
-    /// Boxes that cover what is acceptable
+    /// Boxes that cover the acceptable weights
     Cover,
 }
 

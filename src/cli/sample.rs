@@ -1,18 +1,19 @@
 //! `spectroll sample`: draws of a model, into a data set.
 
 use std::io::{self, Write};
+use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
 use serde::Serialize;
 use spectroll::output::{Outcome, Schema};
-use spectroll::{Choice, Draws, Engine, Recipe, Stream, Summary};
+use spectroll::{Choice, Drawer, Draws, Engine, EngineError, Recipe, Stream, Summary};
 
 use super::dry_run;
-use super::progress::Progress;
 use super::request::{self, Request};
-use super::sink::{OutputArguments, Target};
-use super::{EngineArguments, Usage, check_interrupt, count, grouped, model, watch_interrupts};
+use super::run::{Run, Source, Window};
+use super::sink::OutputArguments;
+use super::{EngineArguments, Usage, count, grouped, model};
 
 /// Draw spectra from a model
 ///
@@ -47,7 +48,7 @@ pub(crate) struct Arguments {
     /// Print the summary as JSON on standard output
     #[arg(long)]
     json: bool,
-    /// Print neither progress nor summary
+    /// Do not print progress and summary
     #[arg(short, long)]
     quiet: bool,
 }
@@ -97,7 +98,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
 
     let start = Instant::now();
-    let (summary, outcome) = draw(arguments, target, schema, &recipe, draws, &engine)?;
+    let mut rows = Rows::new(&recipe, &engine, draws)?;
+    let run = Run {
+        output: &arguments.output,
+        target,
+        schema,
+        spd: (request::spd_name(&arguments.request, model.kind()), draws.first),
+        companions: &[("model.json", &model.to_json())],
+        engine: &engine,
+        quiet: arguments.quiet,
+    };
+    let outcome = run.open(&mut rows)?.make(&mut rows)?;
+    let summary = rows.summary;
     let seconds = start.elapsed().as_secs_f64();
     report(
         arguments,
@@ -132,59 +144,37 @@ fn schema(arguments: &Arguments, recipe: &Recipe, draws: Draws) -> Schema {
     }
 }
 
-/// Makes the draws that are missing.
-fn draw(
-    arguments: &Arguments,
-    target: Target,
-    mut schema: Schema,
-    recipe: &Recipe,
+/// Draws of a recipe as rows of a data set.
+pub(super) struct Rows<'a> {
+    recipe: &'a Recipe,
+    drawer: Drawer<'a>,
     draws: Draws,
-    engine: &Engine,
-) -> anyhow::Result<(Summary, Outcome)> {
-    let is_set = matches!(target, Target::Set(_));
-    let mut drawer = engine.drawer(recipe)?;
-    if is_set {
-        let rounding = request::rounding(recipe, &mut drawer)?;
-        schema.attributes.insert("rounding".to_owned(), rounding.into());
+    /// What those took that were drawn.
+    pub(super) summary: Summary,
+}
+
+impl<'a> Rows<'a> {
+    pub(super) fn new(recipe: &'a Recipe, engine: &'a Engine, draws: Draws) -> Result<Rows<'a>, EngineError> {
+        Ok(Rows { recipe, drawer: engine.drawer(recipe)?, draws, summary: Summary::default() })
     }
-    let spd = (request::spd_name(&arguments.request, recipe.model().kind()), draws.first);
-    let model = recipe.model().to_json();
-    // Checking what is there of a set may take minutes and be ended at any moment; a file that is begun may not.
-    if !is_set {
-        watch_interrupts();
+}
+
+impl Source for Rows<'_> {
+    fn rounding(&mut self) -> Result<String, EngineError> {
+        request::rounding(self.recipe, &mut self.drawer)
     }
-    let mut sink = arguments.output.open(
-        target,
-        &schema,
-        spd,
-        (&[("model.json", &model)], &request::engine_name(engine)),
-    )?;
-    if is_set {
-        watch_interrupts();
-    }
-    let missing = sink.missing(draws.count);
-    let count = missing.iter().map(|part| part.end - part.start).sum();
-    let progress = Progress::new(count, arguments.quiet, arguments.output.to_stdout());
-    let mut summary = Summary::default();
-    let drawn = missing.into_iter().try_for_each(|part| {
-        let first = draws.first.wrapping_add(part.start);
-        let part = Draws { first, count: part.end - part.start, ..draws };
-        let drawn = drawer.draw(part, |batch| {
-            check_interrupt()?;
-            let columns = request::columns(recipe, &batch);
-            sink.write(&columns.iter().map(|column| &**column).collect::<Vec<_>>())?;
-            progress.advance(batch.draws.count);
-            anyhow::Ok(())
+
+    fn draw(&mut self, rows: Range<u64>, window: &mut Window) -> anyhow::Result<()> {
+        let first = self.draws.first.wrapping_add(rows.start);
+        let draws = Draws { first, count: rows.end - rows.start, ..self.draws };
+        let drawn = self.drawer.draw(draws, |batch| {
+            let columns = request::columns(self.recipe, &batch);
+            window(&columns.iter().map(|column| &**column).collect::<Vec<_>>(), batch.draws.count)
         })?;
-        summary.draws += drawn.draws;
-        summary.attempts += drawn.attempts;
-        summary.above_one += drawn.above_one;
-        anyhow::Ok(())
-    });
-    progress.end();
-    match drawn.and_then(|()| Ok(check_interrupt()?)) {
-        Ok(()) => Ok((summary, sink.finish()?)),
-        Err(error) => Err(sink.stop(error)),
+        self.summary.draws += drawn.draws;
+        self.summary.attempts += drawn.attempts;
+        self.summary.above_one += drawn.above_one;
+        Ok(())
     }
 }
 

@@ -7,17 +7,17 @@ use std::time::Instant;
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use spectroll::output::{Constant, Field, Format, Layout, Outcome, Schema, SpdName};
-use spectroll::provenance::Sum;
-use spectroll::scene::{Array, Content, GroupSummary, Outline, PRESETS, Scene, SceneDrawer, Window};
-use spectroll::{Element, Engine, EngineError};
+use spectroll::Engine;
+use spectroll::output::{Outcome, Pending, Schema, SpdName};
+use spectroll::scene::{GroupSummary, Outline, PRESETS, Role, Scene};
 
 use super::dry_run::{room, size};
 use super::picture;
 use super::preview::Preview;
-use super::progress::Progress;
-use super::sink::{OutputArguments, Sink, Target};
-use super::{EngineArguments, Usage, check_interrupt, existing, grouped, request, watch_interrupts};
+use super::run::Run;
+use super::scene_rows::{self, Rows, Selection, element};
+use super::sink::{OutputArguments, Target};
+use super::{EngineArguments, Usage, existing, grouped};
 
 /// Draw scenes of lights, surfaces and targets, as a file says
 ///
@@ -30,12 +30,11 @@ pub(crate) struct Arguments {
     /// The scene file, in TOML
     #[arg(value_name = "FILE", required_unless_present = "example", conflicts_with = "example")]
     file: Option<PathBuf>,
-    /// A built-in scene file instead; without anything to do, print it
+    /// Use a built-in scene file; without -o, --preview or --dry-run, print it
     #[arg(long, value_name = "NAME", value_parser = PRESETS.map(|(name, _)| name))]
     example: Option<String>,
-    /// Draw this group alone
-    #[arg(long, value_name = "GROUP")]
-    only: Option<String>,
+    #[command(flatten)]
+    selection: Selection,
     /// Draw these scenes, B excluded [default: all]
     #[arg(long, value_name = "A..B", value_parser = range)]
     scenes: Option<Range<u64>>,
@@ -52,7 +51,7 @@ pub(crate) struct Arguments {
     /// Print the summary as JSON on standard output
     #[arg(long)]
     json: bool,
-    /// Print neither progress nor summary
+    /// Do not print progress and summary
     #[arg(short, long)]
     quiet: bool,
 }
@@ -84,13 +83,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return Ok(io::stdout().write_all(text.as_bytes())?);
     }
     let folder = arguments.file.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
-    let mut scene = Scene::parse(&name, &text, folder)?;
-    if let Some(only) = &arguments.only {
-        let groups = scene.groups().collect::<Vec<_>>().join(", ");
-        scene = scene
-            .only(only)
-            .ok_or_else(|| Usage(format!("there is no group {only:?}; there are {groups}")))?;
-    }
+    let scene = arguments.selection.of(Scene::parse(&name, &text, folder)?)?;
     let scenes = arguments.scenes.clone().unwrap_or(0..scene.scenes());
     if scenes.end > scene.scenes() {
         let all = scene.scenes();
@@ -100,17 +93,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if idle {
         return Err(Usage("say where to with -o, or ask for --dry-run or --preview".to_owned()).into());
     }
+    let job = Job { arguments, name: &name, text: &text, scene: &scene, scenes };
+    // What cannot be written is found out before anything is drawn.
+    let made = if to_somewhere { Some(job.made()?) } else { None };
+    let picture = arguments.preview.as_deref().map(|path| job.picture(path)).transpose()?;
     let engine =
         Engine::with_threads(&arguments.engine.choice().unwrap_or_default(), arguments.engine.threads)?;
-    let job = Job { arguments, name: &name, text: &text, scene: &scene, scenes, engine: &engine };
     if arguments.dry_run {
-        return job.dry_run();
+        return job.dry_run(&engine);
     }
-    if let Some(path) = &arguments.preview {
-        let format = picture::Format::of(path)?;
-        Preview::new(&scene, &engine, &job.scenes)?.write(path, format, existing(output.force))?;
+    match (made, picture) {
+        (Some(made), picture) => job.run(&engine, made, picture),
+        (None, Some(picture)) => picture.make(&job, &engine),
+        (None, None) => Ok(()),
     }
-    if to_somewhere { job.run() } else { Ok(()) }
 }
 
 /// The name and the text of the scene file.
@@ -143,7 +139,19 @@ struct Job<'a> {
     text: &'a str,
     scene: &'a Scene,
     scenes: Range<u64>,
-    engine: &'a Engine,
+}
+
+/// A picture that can be written.
+struct Picture<'a> {
+    path: &'a Path,
+    format: picture::Format,
+}
+
+impl Picture<'_> {
+    fn make(&self, job: &Job, engine: &Engine) -> anyhow::Result<()> {
+        let existing = existing(job.arguments.output.force);
+        Preview::new(job.scene, engine, &job.scenes)?.write(self.path, self.format, existing)
+    }
 }
 
 impl Job<'_> {
@@ -151,85 +159,73 @@ impl Job<'_> {
         self.scenes.end - self.scenes.start
     }
 
-    fn run(&self) -> anyhow::Result<()> {
+    /// What is to be written and how, if that can be.
+    fn made(&self) -> anyhow::Result<(Target, Schema)> {
         let output = &self.arguments.output;
         if self.arguments.json && output.to_stdout() {
             return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
         }
         let target = output.target()?;
-        let start = Instant::now();
-        let mut drawer = self.scene.drawer(self.engine)?;
-        let mut writer = Columns::new(self, target, &drawer);
-        output.check(target, &writer.schema)?;
-        let is_set = matches!(target, Target::Set(_));
-        if is_set {
-            let rounding = rounding(&mut drawer)?;
-            writer.schema.attributes.insert("rounding".to_owned(), rounding.into());
-        }
-        if !is_set {
-            watch_interrupts();
-        }
-        let companions = [("scene.toml", self.text)];
-        let engine = request::engine_name(self.engine);
-        let mut sink = output.open(
-            target,
-            &writer.schema,
-            (SpdName::Reflectance, self.scenes.start),
-            (&companions, &engine),
-        )?;
-        if is_set {
-            watch_interrupts();
-        }
-        match self.draw(&mut drawer, &writer, &mut sink).and_then(|drawn| {
-            check_interrupt()?;
-            Ok(drawn)
-        }) {
-            Ok(drawn) => {
-                let outcome = sink.finish()?;
-                self.report(drawn, outcome, start.elapsed().as_secs_f64())
-            }
-            Err(error) => Err(sink.stop(error)),
-        }
+        let stored = (target, output.element());
+        let mut schema = scene_rows::schema(self.scene, &self.arguments.selection, stored, self.count());
+        output.check(target, &schema)?;
+        schema.attributes = attributes(self);
+        Ok((target, schema))
     }
 
-    /// Makes the scenes that are missing.
-    fn draw(
+    /// A picture of these scenes at `path`, if it can be written.
+    fn picture<'p>(&self, path: &'p Path) -> anyhow::Result<Picture<'p>> {
+        let format = picture::Format::of(path)?;
+        if !self.arguments.dry_run {
+            Pending::create(path, existing(self.arguments.output.force))?;
+        }
+        Ok(Picture { path, format })
+    }
+
+    fn run(
         &self,
-        drawer: &mut SceneDrawer,
-        columns: &Columns,
-        sink: &mut Sink,
-    ) -> anyhow::Result<Vec<GroupSummary>> {
-        let missing = sink.missing(self.count());
-        let count: u64 = missing.iter().map(|part| part.end - part.start).sum();
-        let progress = Progress::new(count, self.arguments.quiet, self.arguments.output.to_stdout());
-        let mut drawn = drawer.taken_once();
-        let made = missing.into_iter().try_for_each(|part| {
-            let scenes = self.scenes.start + part.start..self.scenes.start + part.end;
-            let part = drawer.draw(scenes, |window| {
-                check_interrupt()?;
-                columns.write(&window, sink)?;
-                progress.advance(window.scenes.end - window.scenes.start);
-                anyhow::Ok(())
-            })?;
-            for (all, part) in drawn.iter_mut().zip(part) {
-                all.summary.draws += part.summary.draws;
-                all.summary.attempts += part.summary.attempts;
-                all.summary.above_one += part.summary.above_one;
-            }
-            anyhow::Ok(())
-        });
-        progress.end();
-        made.map(|()| drawn)
+        engine: &Engine,
+        (target, mut schema): (Target, Schema),
+        picture: Option<Picture>,
+    ) -> anyhow::Result<()> {
+        let start = Instant::now();
+        let mut rows = Rows::new(self.scene, engine, &schema, self.scenes.start)?;
+        schema.constants = rows.constants(&schema);
+        let spd = match scene_rows::role(self.scene) {
+            Role::Illuminant => SpdName::Illuminant,
+            Role::Surface | Role::Target => SpdName::Reflectance,
+        };
+        let run = Run {
+            output: &self.arguments.output,
+            target,
+            schema,
+            spd: (spd, self.scenes.start),
+            companions: &[("scene.toml", self.text)],
+            engine,
+            quiet: self.arguments.quiet,
+        };
+        let open = run.open(&mut rows)?;
+        if let Some(error) = picture.and_then(|picture| picture.make(self, engine).err()) {
+            return Err(open.stop(error));
+        }
+        let outcome = open.make(&mut rows)?;
+        self.report(engine, rows.drawn, outcome, start.elapsed().as_secs_f64())
     }
 
-    fn report(&self, drawn: Vec<GroupSummary>, outcome: Outcome, seconds: f64) -> anyhow::Result<()> {
+    fn report(
+        &self,
+        engine: &Engine,
+        drawn: Vec<GroupSummary>,
+        outcome: Outcome,
+        seconds: f64,
+    ) -> anyhow::Result<()> {
         let report = Report {
             output: Some(self.arguments.output.output.display().to_string()),
             drawn,
             complete: outcome == Outcome::Sealed,
             seconds,
             scenes_per_second: self.count() as f64 / seconds,
-            ..self.outline()
+            ..self.outline(engine)
         };
         if self.arguments.json {
             writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
@@ -254,12 +250,21 @@ impl Job<'_> {
     }
 
     /// What drawing takes, before anything is drawn.
-    fn outline(&self) -> Report {
+    fn outline(&self, engine: &Engine) -> Report {
         let mut outline = self.scene.outline(self.count());
-        if self.engine.adapter().is_none() && outline.kernels > 0 {
+        if engine.adapter().is_none() && outline.shaders > 0 {
             outline.left_out.push("the CPU draws, and nothing is compiled".to_owned());
-            outline.kernels = 0;
+            outline.shaders = 0;
         }
+        for group in &mut outline.groups {
+            let all = group.arrays.len();
+            group.arrays.retain(|array| self.arguments.selection.has(array));
+            if group.arrays.len() < all {
+                outline.left_out.push(format!("{}: arrays that --arrays does not name", group.name));
+            }
+        }
+        let arrays = outline.groups.iter().flat_map(|group| &group.arrays);
+        outline.bytes = arrays.map(|a| a.bytes() as u64 * if a.per_scene { self.count() } else { 1 }).sum();
         Report {
             scene: self.name.to_owned(),
             output: None,
@@ -271,13 +276,13 @@ impl Job<'_> {
             complete: false,
             seconds: 0.0,
             scenes_per_second: 0.0,
-            engine: self.engine.to_string(),
+            engine: engine.to_string(),
             version: env!("CARGO_PKG_VERSION"),
         }
     }
 
-    fn dry_run(&self) -> anyhow::Result<()> {
-        let report = self.outline();
+    fn dry_run(&self, engine: &Engine) -> anyhow::Result<()> {
+        let report = self.outline(engine);
         let mut out = io::stdout();
         if self.arguments.json {
             return Ok(writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?);
@@ -285,11 +290,11 @@ impl Job<'_> {
         let Report { scene, outline, engine, .. } = report;
         writeln!(out, "{scene}: {} scenes on {} nm", grouped(self.count()), self.scene.grid())?;
         for group in &outline.groups {
-            let by = match (group.kernel, group.draws_per_scene, group.draws_once) {
+            let by = match (group.shader, group.draws_per_scene, group.draws_once) {
                 (_, 0, 0) => "nothing drawn".to_owned(),
                 (_, 0, once) => format!("{} drawn once, on the CPU", grouped(once)),
-                (Some(kernel), each, _) if outline.kernels > 0 => {
-                    format!("{} a scene, by kernel {kernel}", grouped(each))
+                (Some(shader), each, _) if outline.shaders > 0 => {
+                    format!("{} a scene, by shader {shader}", grouped(each))
                 }
                 (_, each, _) => format!("{} a scene, on the CPU", grouped(each)),
             };
@@ -304,14 +309,14 @@ impl Job<'_> {
         for line in &outline.left_out {
             writeln!(out, "    {line}")?;
         }
-        let kernels = match outline.kernels {
-            0 => "no kernel compiled".to_owned(),
-            1 => "1 kernel compiled".to_owned(),
-            n => format!("{n} kernels compiled"),
+        let shaders = match outline.shaders {
+            0 => "no shader compiled".to_owned(),
+            1 => "1 shader compiled".to_owned(),
+            n => format!("{n} shaders compiled"),
         };
         writeln!(
             out,
-            "  {} spectra drawn by {engine}, {kernels}, {}",
+            "  {} spectra drawn by {engine}, {shaders}, {}",
             grouped(outline.draws),
             size(outline.bytes)
         )?;
@@ -323,108 +328,14 @@ impl Job<'_> {
     }
 }
 
-/// A sum that engines share exactly where they round alike: of the first scene, whatever is asked for.
-fn rounding(drawer: &mut SceneDrawer) -> Result<String, EngineError> {
-    let mut sum = Sum::default();
-    drawer.draw(0..1, |window| {
-        window.arrays().for_each(|(_, bytes)| sum.update(bytes));
-        Ok::<_, EngineError>(())
-    })?;
-    Ok(sum.finish())
-}
-
-fn element(array: &Array) -> Element {
-    match array.content {
-        Content::Attempts => Element::U32,
-        _ => Element::F32,
-    }
-}
-
-/// The arrays of scenes as a data set has them, a row a scene.
-struct Columns {
-    schema: Schema,
-    /// What all scenes share, for formats that hold nothing but rows.
-    repeated: Vec<Vec<u8>>,
-}
-
-impl Columns {
-    fn new(job: &Job, target: Target, drawer: &SceneDrawer) -> Columns {
-        let stored = job.arguments.output.element();
-        let shares = !matches!(
-            target,
-            Target::Stdout
-                | Target::Spd
-                | Target::File(Format::Csv | Format::Parquet | Format::Npy)
-                | Target::Set(Layout::Parquet)
-        );
-        let varying = job.scene.arrays().filter(|array| array.per_scene);
-        let mut fields: Vec<_> = varying.map(|array| field(array).stored_as(stored)).collect();
-        let (mut constants, mut repeated) = (Vec::new(), Vec::new());
-        for (array, bytes) in drawer.constants() {
-            if shares {
-                let extents = array.shape.iter().map(|&extent| extent as u64);
-                let axes = axes(array).into_iter().zip(extents).collect();
-                constants.push(Constant { name: array.name.clone(), axes, element: element(array), bytes });
-            } else {
-                fields.push(field(array).stored_as(stored));
-                repeated.push(bytes);
-            }
-        }
-        let schema = Schema {
-            fields,
-            row: "scene".to_owned(),
-            constants,
-            count: job.count(),
-            wavelengths: job.scene.grid().wavelengths().collect(),
-            attributes: attributes(job),
-        };
-        Columns { schema, repeated }
-    }
-
-    fn write(&self, window: &Window, sink: &mut Sink) -> anyhow::Result<()> {
-        let count = (window.scenes.end - window.scenes.start) as usize;
-        let repeated: Vec<_> = self.repeated.iter().map(|bytes| bytes.repeat(count)).collect();
-        let columns: Vec<_> =
-            window.arrays().map(|(_, bytes)| bytes).chain(repeated.iter().map(Vec::as_slice)).collect();
-        sink.write(&columns)
-    }
-}
-
-/// The names of the dimensions of an entry of an array.
-fn axes(array: &Array) -> Vec<String> {
-    // Not that of the group alone: xarray takes a dimension of an array's name for its coordinates.
-    let group = array.name.strip_suffix(array.content.suffix()).unwrap_or(&array.name);
-    let mut axes = Vec::new();
-    let inner = array.content.axis();
-    if array.shape.len() > usize::from(inner.is_some()) {
-        axes.push(format!("{group}_number"));
-    }
-    axes.extend(inner.map(str::to_owned));
-    axes
-}
-
-fn field(array: &Array) -> Field {
-    let inner = array.content.axis();
-    let last = array.shape.last().copied().unwrap_or(1);
-    let field = match inner {
-        Some(axis) => Field::vector(&array.name, axis, last, element(array)),
-        None => Field::scalar(&array.name, element(array)),
-    };
-    match axes(array).first() {
-        Some(outer) if array.shape.len() > usize::from(inner.is_some()) => {
-            field.repeated(outer, array.shape[0])
-        }
-        _ => field,
-    }
-}
-
 /// What scenes are made from.
 fn attributes(job: &Job) -> Map<String, Value> {
     let attributes = json!({
         // A folder on this machine is nobody else's business.
         "scene_file": Path::new(job.name).file_name().unwrap_or_default().to_string_lossy(),
         "scene": job.text,
-        "only": job.arguments.only,
+        "models_blake3": scene_rows::models(job.scene),
+        "selection": job.arguments.selection,
         "seed": job.scene.seed(),
         "start": job.scenes.start,
         "program": concat!("spectroll ", env!("CARGO_PKG_VERSION")),

@@ -29,7 +29,7 @@ pub(super) struct OutputArguments {
     /// The type of the numbers
     #[arg(long, value_enum, default_value = "f32")]
     dtype: TypeName,
-    /// How many draws each chunk of a .zarr or of FOLDER/ has [default: about 16 MiB of them]
+    /// How many draws each chunk of a .zarr or of FOLDER/ has [default: what makes about 16 MiB]
     #[arg(long, value_name = "DRAWS", value_parser = count)]
     chunk: Option<u64>,
     /// Pack the chunks of a .zarr with Zstandard [level: 3]
@@ -51,7 +51,7 @@ pub(super) struct OutputArguments {
 enum FormatName {
     /// NumPy, one array
     Npy,
-    /// NumPy, an array a quantity
+    /// NumPy, an array for each quantity
     Npz,
     /// Text
     Csv,
@@ -63,7 +63,7 @@ enum FormatName {
     Parquet,
     /// Zarr, version 3
     Zarr,
-    /// A folder of text files, one a spectrum, for renderers
+    /// A folder of text files, one for each spectrum, for renderers
     Spd,
 }
 
@@ -113,7 +113,9 @@ impl OutputArguments {
             self.output.as_os_str().as_encoded_bytes().last().is_some_and(|&b| b == b'/' || b == b'\\');
         let target = match format {
             Some(Format::Csv) | None if self.to_stdout() => Target::Stdout,
-            Some(_) if self.to_stdout() => return Err(usage("standard output is CSV only")),
+            Some(_) if self.to_stdout() => {
+                return Err(usage("standard output takes CSV only: name a file, or drop --format"));
+            }
             _ => match format.map_or_else(|| Format::of(&self.output), Ok)? {
                 Format::Zarr => Target::Set(Layout::Zarr { zstd: self.zstd }),
                 Format::Spd => Target::Spd,

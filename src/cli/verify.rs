@@ -1,17 +1,22 @@
 //! `spectroll verify` and `spectroll merge`: sets that were written before.
 
-use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use rand::Rng;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
-use spectroll::output::{Audit, merge};
+use spectroll::output::{Audit, Schema, merge};
 use spectroll::provenance::model_sum;
-use spectroll::{Choice, Draws, Element, Engine, Model, Recipe, Stream};
+use spectroll::scene::Scene;
+use spectroll::{Choice, Draws, Engine, EngineError, Model, Recipe, Stream};
 
-use super::request::{self, Request};
+use super::request::Request;
+use super::run::Source;
+use super::sample;
+use super::scene_rows::{self, Selection};
 use super::{EngineArguments, Unverified, check_interrupt, grouped, watch_interrupts};
 
 /// Check a .zarr or a folder of parts against its manifest, and draw some of it again
@@ -23,9 +28,12 @@ pub(crate) struct VerifyArguments {
     /// The share of the chunks that is drawn again and compared, 0 to 1
     #[arg(long, default_value_t = 0.01, value_name = "SHARE", value_parser = share)]
     redraw: f64,
+    /// Where the files are that a scene names [default: the folder that holds the set]
+    #[arg(long, value_name = "FOLDER")]
+    files: Option<PathBuf>,
     #[command(flatten)]
     engine: EngineArguments,
-    /// Print nothing where all is well
+    /// Print nothing unless something is wrong
     #[arg(short, long)]
     quiet: bool,
 }
@@ -54,11 +62,11 @@ pub(crate) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
         faults.extend(audit.fault(chunk));
     }
     let again = chosen(&chunks, arguments.redraw);
+    let mut left = None;
     if !again.is_empty() && faults.is_empty() {
-        let drawn = Redrawing::new(arguments, &audit)?;
-        let engine = drawn.engine()?;
-        for &chunk in &again {
-            faults.extend(drawn.difference(&engine, &audit, chunk)?);
+        match Made::from(arguments, &audit)? {
+            Ok(made) => faults = made.differences(arguments, &audit, &again)?,
+            Err(reason) => left = Some(reason),
         }
     }
     if !faults.is_empty() {
@@ -68,9 +76,11 @@ pub(crate) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
     }
     if !arguments.quiet {
         let (done, all) = (grouped(chunks.len() as u64), grouped(audit.plan().chunks()));
-        let again = grouped(again.len() as u64);
         eprintln!("{}: {done} of {all} chunks are as they were written", arguments.path.display());
-        eprintln!("  {again} of them drawn again, with the same bytes");
+        match left {
+            Some(reason) => eprintln!("  none of them drawn again: {reason}"),
+            None => eprintln!("  {} of them drawn again, with the same bytes", grouped(again.len() as u64)),
+        }
     }
     Ok(())
 }
@@ -89,76 +99,131 @@ fn share(text: &str) -> Result<f64, String> {
     share.ok_or_else(|| "expected a share from 0 to 1".to_owned())
 }
 
-/// What it takes to draw a set again.
-struct Redrawing {
-    recipe: Recipe,
-    stream: Stream,
-    first: u64,
-    rounding: String,
-    choice: Option<Choice>,
-    threads: Option<std::num::NonZeroUsize>,
-    path: PathBuf,
+/// What a set was made from.
+enum Made {
+    Draws { recipe: Box<Recipe>, draws: Draws },
+    Scenes { scene: Box<Scene>, first: u64 },
 }
 
-impl Redrawing {
-    fn new(arguments: &VerifyArguments, audit: &Audit) -> anyhow::Result<Redrawing> {
-        let attributes = &audit.plan().schema.attributes;
-        let unusable = || format!("{:?} does not say how it was drawn; pass --redraw 0", arguments.path);
-        let text = |name: &str| attributes.get(name).and_then(Value::as_str).with_context(unusable);
-        let number = |name: &str| attributes.get(name).and_then(Value::as_u64).with_context(unusable);
-        let sum = text("model_blake3")?;
-        let model = Model::load(&arguments.path.join("model.json"))?;
-        if model_sum(&model) != sum {
-            return Err(
-                Unverified(format!("{:?}: model.json is not what was written", arguments.path)).into()
-            );
+/// What a set says of itself.
+struct Attributes<'a> {
+    path: &'a Path,
+    schema: &'a Schema,
+}
+
+impl Attributes<'_> {
+    fn value(&self, name: &str) -> anyhow::Result<&Value> {
+        let unusable = || format!("{:?} does not say how it was drawn; pass --redraw 0", self.path);
+        self.schema.attributes.get(name).with_context(unusable)
+    }
+
+    fn read<T: DeserializeOwned>(&self, name: &str) -> anyhow::Result<T> {
+        let wrong =
+            |e| format!("{:?} does not say how it was drawn ({name}: {e}); pass --redraw 0", self.path);
+        serde_json::from_value(self.value(name)?.clone()).map_err(|e| anyhow::anyhow!(wrong(e)))
+    }
+}
+
+impl Made {
+    /// What the set was made from, or why that is not at hand.
+    fn from(arguments: &VerifyArguments, audit: &Audit) -> anyhow::Result<Result<Made, String>> {
+        let schema = &audit.plan().schema;
+        let attributes = Attributes { path: &arguments.path, schema };
+        match schema.attributes.contains_key("scene") {
+            true => Made::scenes(arguments, &attributes),
+            false => Made::draws(&attributes).map(Ok),
         }
-        let request = attributes.get("recipe").cloned().with_context(unusable)?;
-        let request: Request = serde_json::from_value(request)?;
-        let seed = number("seed")?;
-        Ok(Redrawing {
-            recipe: request.recipe(&model)?,
-            stream: text("stream").map_or(Stream::new(seed), |name| Stream::named(seed, name)),
-            first: number("start")?,
-            rounding: text("rounding")?.to_owned(),
-            choice: arguments.engine.choice(),
-            threads: arguments.engine.threads,
-            path: arguments.path.clone(),
+    }
+
+    fn draws(attributes: &Attributes) -> anyhow::Result<Made> {
+        let sum: String = attributes.read("model_blake3")?;
+        let model = Model::load(&attributes.path.join("model.json"))?;
+        if model_sum(&model) != sum {
+            let text = format!("{:?}: model.json is not what was written", attributes.path);
+            return Err(Unverified(text).into());
+        }
+        let recipe = Box::new(attributes.read::<Request>("recipe")?.recipe(&model)?);
+        let (seed, count) = (attributes.read("seed")?, attributes.schema.count);
+        let stream = match attributes.read::<Option<String>>("stream")? {
+            Some(name) => Stream::named(seed, &name),
+            None => Stream::new(seed),
+        };
+        Ok(Made::Draws { recipe, draws: Draws { stream, first: attributes.read("start")?, count } })
+    }
+
+    /// A set has the text of its scene file, but not the files that this names.
+    fn scenes(arguments: &VerifyArguments, attributes: &Attributes) -> anyhow::Result<Result<Made, String>> {
+        let (name, text): (String, String) = (attributes.read("scene_file")?, attributes.read("scene")?);
+        let models: BTreeMap<String, String> = attributes.read("models_blake3")?;
+        let beside = arguments.path.parent().unwrap_or(Path::new(""));
+        let folder = arguments.files.as_deref().unwrap_or(beside);
+        let remedy = "name the folder of the scene file with --files";
+        let scene = match Scene::parse(&name, &text, folder) {
+            Ok(scene) => attributes.read::<Selection>("selection")?.of(scene)?,
+            Err(error) => return Ok(Err(format!("{error}; {remedy}"))),
+        };
+        if let Some((group, _)) =
+            scene_rows::models(&scene).iter().find(|(group, sum)| models.get(*group) != Some(sum))
+        {
+            let what = format!("the model or the mean of {group:?} in {folder:?} is not that of the set");
+            return Ok(Err(format!("{what}; {remedy}")));
+        }
+        Ok(Ok(Made::Scenes { scene: Box::new(scene), first: attributes.read("start")? }))
+    }
+
+    /// What draws it again.
+    fn source<'a>(
+        &'a self,
+        engine: &'a Engine,
+        schema: &Schema,
+    ) -> Result<Box<dyn Source + 'a>, EngineError> {
+        Ok(match self {
+            Made::Draws { recipe, draws } => Box::new(sample::Rows::new(recipe, engine, *draws)?),
+            Made::Scenes { scene, first } => Box::new(scene_rows::Rows::new(scene, engine, schema, *first)?),
         })
     }
 
     /// An engine that rounds as the one that drew the set: the one asked for, or the first that does.
-    fn engine(&self) -> anyhow::Result<Engine> {
-        let choices = self.choice.clone().map_or(vec![Choice::Auto, Choice::Cpu], |choice| vec![choice]);
-        for choice in choices {
-            let engine = Engine::with_threads(&choice, self.threads)?;
-            if request::rounding(&self.recipe, &mut engine.drawer(&self.recipe)?)? == self.rounding {
+    fn engine(&self, arguments: &VerifyArguments, schema: &Schema) -> anyhow::Result<Engine> {
+        let rounding: String = Attributes { path: &arguments.path, schema }.read("rounding")?;
+        let choice = arguments.engine.choice();
+        for choice in choice.map_or(vec![Choice::Auto, Choice::Cpu], |choice| vec![choice]) {
+            let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
+            if self.source(&engine, schema)?.rounding()? == rounding {
                 return Ok(engine);
             }
         }
         anyhow::bail!(
             "{:?} was drawn by an adapter that rounds otherwise than what draws here: choose one with --adapter, \
              or pass --redraw 0",
-            self.path
+            arguments.path
         )
     }
 
-    fn difference(&self, engine: &Engine, audit: &Audit, chunk: u64) -> anyhow::Result<Option<String>> {
-        let draws = audit.plan().draws(chunk);
-        let schema = request::schema(&self.recipe, audit.plan().schema.count, Element::F32);
-        let mut columns = vec![Vec::new(); schema.fields.len()];
-        let draws = Draws {
-            stream: self.stream,
-            first: self.first.wrapping_add(draws.start),
-            count: draws.end - draws.start,
-        };
-        engine.draw(&self.recipe, draws, |batch| {
-            check_interrupt()?;
-            for (column, bytes) in columns.iter_mut().zip(request::columns(&self.recipe, &batch)) {
-                column.extend_from_slice(&bytes);
-            }
-            anyhow::Ok(())
-        })?;
-        Ok(audit.difference(chunk, &columns)?)
+    /// How these chunks differ from what is drawn now, where they do, and what all rows share.
+    fn differences(
+        &self,
+        arguments: &VerifyArguments,
+        audit: &Audit,
+        chunks: &BTreeSet<u64>,
+    ) -> anyhow::Result<Vec<String>> {
+        let schema = &audit.plan().schema;
+        let engine = self.engine(arguments, schema)?;
+        let mut differences = Vec::new();
+        if let Made::Scenes { scene, first } = self {
+            let constants = scene_rows::Rows::new(scene, &engine, schema, *first)?.constants(schema);
+            differences.extend(audit.shared_difference(constants)?);
+        }
+        let mut source = self.source(&engine, schema)?;
+        for &chunk in chunks {
+            let mut columns = vec![Vec::new(); schema.fields.len()];
+            source.draw(audit.plan().draws(chunk), &mut |window, _| {
+                check_interrupt()?;
+                columns.iter_mut().zip(window).for_each(|(column, bytes)| column.extend_from_slice(bytes));
+                Ok(())
+            })?;
+            differences.extend(audit.difference(chunk, &columns)?);
+        }
+        Ok(differences)
     }
 }

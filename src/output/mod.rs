@@ -130,15 +130,26 @@ impl Format {
         let shares = !schema.constants.is_empty();
         let halves = schema.fields.iter().any(|field| field.stored == Element::F16);
         let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
+        let of_scenes = schema.row == "scene";
         match self {
             Format::Npy | Format::Csv | Format::Parquet | Format::Spd if shares => {
                 cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
             }
+            Format::Npy if !one && of_scenes => {
+                let remedy = "choose one with --arrays, or name it .npz, .zarr, .h5 or .parquet";
+                cannot(".npy", "one array", remedy)
+            }
             Format::Npy if !one => {
-                cannot(".npy", "one array", "ask for one quantity, or name it .npz, .zarr, .h5 or .parquet")
+                let remedy = "choose one with --quantities, or name it .npz, .zarr, .h5 or .parquet";
+                cannot(".npy", "one array", remedy)
             }
             Format::Spd if !(one && schema.fields[0].axis.as_deref() == Some("wavelength")) => {
-                cannot(".spd", "spectra", "ask for those alone")
+                let scene = "choose one group's spectra with --arrays";
+                cannot(
+                    ".spd",
+                    "spectra",
+                    if of_scenes { scene } else { "choose them with --quantities spectra" },
+                )
             }
             Format::Mat if halves => cannot(".mat", "f32 and f64", "choose one with --dtype"),
             Format::Parquet if halves => cannot(".parquet", "f32 and f64", "choose one with --dtype"),

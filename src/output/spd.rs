@@ -47,7 +47,7 @@ pub struct SpdFolder {
 }
 
 impl SpdFolder {
-    /// Begins a folder that will appear as `path`, and whose first spectrum is draw `first`.
+    /// Begins a folder that will appear as `path`, and whose first spectrum is that of row `first`.
     pub fn create(
         path: &Path,
         schema: &Schema,
@@ -63,12 +63,16 @@ impl SpdFolder {
                 OutputError::Exists { path }
             });
         }
-        if schema.count > MOST_FILES && existing == Existing::Keep {
-            return Err(OutputError::ManyFiles { path, count: schema.count });
+        let each = schema.fields.iter().find_map(|field| field.outer.as_ref()).map_or(1, |(_, n)| *n as u64);
+        let count = schema.count.saturating_mul(each);
+        if count > MOST_FILES && existing == Existing::Keep {
+            return Err(OutputError::ManyFiles { path, count });
         }
         let parent = existing_folder(&path)?;
         match tempfile::Builder::new().prefix(".spectroll-").suffix(".partial").tempdir_in(parent) {
-            Ok(folder) => Ok(SpdFolder { folder, path, name, schema: schema.clone(), next: first + 1 }),
+            Ok(folder) => {
+                Ok(SpdFolder { folder, path, name, schema: schema.clone(), next: first * each + 1 })
+            }
             Err(source) => Err(OutputError::Write { path, source }),
         }
     }
@@ -78,7 +82,8 @@ impl SpdFolder {
         let ([field], [column]) = (self.schema.fields.as_slice(), columns) else {
             unreachable!("the schema has one field: see Format::check")
         };
-        for spectrum in column.chunks_exact(field.delivered_bytes()) {
+        // A scene has several spectra of a group: each has a file of its own.
+        for spectrum in column.chunks_exact(self.schema.wavelengths.len() * field.element.size()) {
             let mut text = String::new();
             for (wavelength, value) in self.schema.wavelengths.iter().zip(field.values(spectrum)) {
                 writeln!(text, "{wavelength} {}", decimal(value)).expect("a string takes it all");

@@ -17,6 +17,8 @@ use super::group::{Aim, Base, Group, Illuminants, Levels, Sharing, Targets};
 pub(super) struct Cast {
     pub(super) name: String,
     pub(super) role: Role,
+    /// What its spectra are drawn from; flat ones are not.
+    pub(super) model: Option<Model>,
     /// How many a scene has.
     pub(super) count: u32,
     /// In rows of that.
@@ -167,8 +169,12 @@ impl Cast {
             }
         };
         let arrays = arrays(group, &shapes, intensity.as_ref(), grid.len());
+        let model = match &shapes {
+            Shapes::Engine(drawing) | Shapes::Once(drawing) => Some(drawing.recipe.model().clone()),
+            Shapes::Aimed(_) => base.model.clone(),
+        };
         let (name, max_attempts) = (base.name.clone(), base.max_attempts);
-        Ok(Cast { name, role, count, stream, max_attempts, shapes, intensity, arrays })
+        Ok(Cast { name, role, model, count, stream, max_attempts, shapes, intensity, arrays })
     }
 
     /// What the engine draws, where it does.

@@ -48,6 +48,7 @@ mod reader;
 mod record;
 
 use crate::grid::Grid;
+use crate::model::Model;
 use crate::stream::Stream;
 
 use cast::Cast;
@@ -113,9 +114,20 @@ impl Scene {
     }
 
     /// The scene with one of its groups alone, whose draws stay what they are; `None` where there is no such group.
-    pub fn only(mut self, group: &str) -> Option<Scene> {
-        self.casts.retain(|cast| cast.name == group);
+    pub fn only(self, group: &str) -> Option<Scene> {
+        self.keep(|name| name == group)
+    }
+
+    /// The scene with those of its groups that are wanted, whose draws stay what they are; `None` where none is.
+    pub fn keep(mut self, wanted: impl Fn(&str) -> bool) -> Option<Scene> {
+        self.casts.retain(|cast| wanted(&cast.name));
         (!self.casts.is_empty()).then_some(self)
+    }
+
+    /// The names of the groups that are drawn from a model, with that model: with the group's own mean where it has
+    /// one.
+    pub fn models(&self) -> impl Iterator<Item = (&str, &Model)> {
+        self.casts.iter().filter_map(|cast| Some((cast.name.as_str(), cast.model.as_ref()?)))
     }
 }
 

@@ -12,7 +12,7 @@ pub struct Outline {
     /// The groups, in order.
     pub groups: Vec<GroupOutline>,
     /// How many shaders are compiled, where a graphics adapter draws.
-    pub kernels: usize,
+    pub shaders: usize,
     /// How many spectra are drawn for so many scenes, those of all scenes included.
     pub draws: u64,
     /// What is not done, and why.
@@ -29,7 +29,7 @@ pub struct GroupOutline {
     /// What its spectra are.
     pub role: Role,
     /// The number of the shader that draws it, from 1; none where the CPU does.
-    pub kernel: Option<usize>,
+    pub shader: Option<usize>,
     /// How many spectra are drawn for each scene.
     pub draws_per_scene: u64,
     /// How many are drawn once for all.
@@ -45,18 +45,18 @@ impl Scene {
         let mut left_out = Vec::new();
         let mut groups = Vec::new();
         for cast in &self.casts {
-            let mut kernel = None;
+            let mut shader = None;
             if let Some(drawing) = cast.drawn_by_engine() {
                 let program = drawing.recipe.program();
                 let known = programs.iter().position(|known| *known == program);
                 if let Some(known) = known {
                     left_out.push(format!(
-                        "{}: no kernel of its own, for its model and recipe are those of kernel {}",
+                        "{}: no shader of its own, for its model and recipe are those of shader {}",
                         cast.name,
                         known + 1
                     ));
                 }
-                kernel = Some(
+                shader = Some(
                     1 + known.unwrap_or_else(|| {
                         programs.push(program);
                         programs.len() - 1
@@ -68,7 +68,7 @@ impl Scene {
             groups.push(GroupOutline {
                 name: cast.name.clone(),
                 role: cast.role,
-                kernel,
+                shader,
                 draws_per_scene,
                 draws_once,
                 arrays: cast.arrays.clone(),
@@ -83,7 +83,7 @@ impl Scene {
             }
         }
         Outline {
-            kernels: programs.len(),
+            shaders: programs.len(),
             draws: groups.iter().map(|group| group.draws_once + scenes * group.draws_per_scene).sum(),
             bytes: self.arrays().map(|a| a.bytes() as u64 * if a.per_scene { scenes } else { 1 }).sum(),
             groups,
@@ -115,7 +115,7 @@ fn spared(cast: &Cast) -> Option<String> {
             )
         }
         Shapes::Once(_) => {
-            format!("{name}: it is fixed, so it is drawn and stored once, on the CPU without a kernel")
+            format!("{name}: it is fixed, so it is drawn and stored once, on the CPU without a shader")
         }
         Shapes::Engine(drawing) if drawing.places < cast.count => {
             format!("{name}: its lights have the same shape, so one of {} is drawn", cast.count)
@@ -124,7 +124,7 @@ fn spared(cast: &Cast) -> Option<String> {
         Shapes::Aimed(aimed) => match **aimed {
             Aimed::Flat { .. } => format!("{name}: flat spectra are not drawn"),
             Aimed::Once { .. } => format!("{name}: its copies have the same shape, so it is drawn once"),
-            _ => format!("{name}: targets are few, so they are drawn on the CPU without a kernel"),
+            _ => format!("{name}: targets are few, so they are drawn on the CPU without a shader"),
         },
     })
 }

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::super::OutputError;
+use super::super::schema::Constant;
+use super::Part;
 use super::manifest::{Manifest, Plan, Sum};
 
 /// A set that is being checked, complete or not.
@@ -37,6 +39,18 @@ impl Audit {
     /// How the files of a chunk differ from what was written, if they do.
     pub fn fault(&self, chunk: u64) -> Option<String> {
         self.manifest.chunks[&chunk].iter().find_map(|sum| sum.fault(&self.root))
+    }
+
+    /// How what all draws share, drawn again as `constants`, differs from what was written, if it does: no manifest
+    /// has its sums.
+    pub fn shared_difference(&self, constants: Vec<Constant>) -> Result<Option<String>, OutputError> {
+        let mut plan = self.manifest.plan.clone();
+        plan.schema.constants = constants;
+        let failed = |source| OutputError::Write { path: self.root.clone(), source };
+        let parts = plan.layout.constants(&plan).map_err(failed)?;
+        let differs =
+            |part: &&Part| std::fs::read(self.root.join(&part.name)).ok() != Some(part.bytes.to_vec());
+        Ok(parts.iter().find(differs).map(|part| format!("{} is not what is drawn now", part.name)))
     }
 
     /// How a chunk that was drawn again differs from what was written, if it does. `columns` are its draws.
