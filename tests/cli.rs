@@ -84,7 +84,7 @@ fn impossible_and_hopeless_requests_are_refused() {
         ("granada -n 5 --lrv 0.5", 2, "this model is of illuminants"),
         ("granada -n 5 --start 18446744073709551615", 2, "pass the last"),
         ("granada -n 18446744073709551615", 2, "more than any disk holds"),
-        ("granada -n -5", 2, "unexpected argument"),
+        ("granada -n -5", 2, "expected a whole number"),
         ("granada -n 1.5", 2, "expected a whole number"),
         ("munsel -n 5", 2, "neither a file nor a built-in model (munsell-vrhel, granada"),
         ("granada -n 5 --adapter nonesuch", 3, "no adapter \"nonesuch\""),
@@ -295,6 +295,56 @@ fn arrays_of_scenes_are_written_alone() {
                 assert 'background' not in s and 'lights' not in s; \
                 assert (s['target'] == a['target']).all() and (np.load('lights.npy') == a['lights']).all()";
     program::python(folder.path(), code);
+}
+
+/// The size is that of what the run then makes, of text within a tenth.
+#[test]
+fn a_dry_run_says_what_would_be() {
+    let folder = tempfile::tempdir().unwrap();
+    for (output, exact) in [("a.npy", true), ("a.zarr", true), ("a.csv", false)] {
+        let draw = format!("sample munsell-vrhel -n 1000 --engine cpu -o {output}");
+        let (json, _) = succeeds(folder.path(), &format!("{draw} --dry-run --json"));
+        assert!(files(folder.path()).is_empty(), "{output}");
+        let would: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let bytes = would["bytes"].as_u64().unwrap();
+        assert!(would["free"].as_u64().unwrap() > bytes && would["draws_per_second"].as_f64().unwrap() > 0.0);
+        assert_eq!(would["arrays"][0]["shape"], serde_json::json!([1000, 31]));
+        succeeds(folder.path(), &draw);
+        let path = folder.path().join(output);
+        let made = if path.is_dir() { path.join("spectra/c.0.0") } else { path.clone() };
+        let made = fs::metadata(made).unwrap().len();
+        assert!(if exact { (bytes..bytes + 200).contains(&made) } else { made.abs_diff(bytes) < bytes / 10 });
+        if path.is_dir() { fs::remove_dir_all(path).unwrap() } else { fs::remove_file(path).unwrap() }
+    }
+}
+
+/// What is done is done, and a job that nobody listens to has not failed.
+#[cfg(target_os = "linux")]
+#[test]
+fn nobody_need_listen() {
+    let folder = tempfile::tempdir().unwrap();
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let words = "sample granada -n 10 --engine cpu -o a.npy".split_whitespace();
+    let status = Command::new(PROGRAM).args(words).current_dir(folder.path()).stderr(full).status().unwrap();
+    assert!(status.success() && folder.path().join("a.npy").is_file());
+}
+
+/// As `nohup` starts it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_hangup_that_is_ignored_stays_ignored() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |trap: &str| {
+        let script = format!(
+            "{trap}; {} sample granada -n 3e7 --engine cpu -t 1 -q -o a.npy --force & sleep 0.4; kill -HUP $!; wait $!",
+            PROGRAM
+        );
+        Command::new("sh").arg("-c").arg(script).current_dir(folder.path()).output().unwrap()
+    };
+    assert_eq!(run("true").status.code(), Some(130));
+    assert!(files(folder.path()).is_empty());
+    assert_eq!(run("trap '' HUP").status.code(), Some(0));
+    assert_eq!(files(folder.path()), ["a.npy"]);
 }
 
 #[test]

@@ -36,8 +36,13 @@ pub(super) fn expand(command: &Command, given: Vec<OsString>) -> Result<Vec<OsSt
         let Some(argument) = subcommand.get_arguments().find(|a| name_of(a) == key && key != "config") else {
             return Err(unusable(format!("`spectroll {name}` has no flag {key:?}")));
         };
-        let mut rivals = subcommand.get_arg_conflicts_with(argument).into_iter().chain([argument]);
-        if rivals.any(|rival| is_given(matches, rival)) {
+        // A conflict is declared on one of the two.
+        let conflict =
+            |a: &Arg, b: &Arg| subcommand.get_arg_conflicts_with(a).iter().any(|c| c.get_id() == b.get_id());
+        let is_rival = |other: &&Arg| {
+            other.get_id() == argument.get_id() || conflict(other, argument) || conflict(argument, other)
+        };
+        if subcommand.get_arguments().filter(is_rival).any(|rival| is_given(matches, rival)) {
             continue;
         }
         all.extend(words(argument, &value).map_err(|e| unusable(format!("{key}: {e}")))?);

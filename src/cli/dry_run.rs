@@ -4,7 +4,8 @@ use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use spectroll::output::Schema;
+use serde::Serialize;
+use spectroll::output::{Field, Format, Schema};
 use spectroll::{Engine, Recipe, Stream};
 
 use super::grouped;
@@ -13,40 +14,103 @@ use super::sink::{OutputArguments, Target};
 /// How long the drawing is tried.
 const TRIAL: Duration = Duration::from_millis(300);
 
-pub(super) fn report(
-    output: &OutputArguments,
+/// Bytes of a number as text, with what sets it apart: ours have 8 digits or so.
+const TEXT: u64 = 11;
+
+/// What would be made.
+#[derive(Serialize)]
+pub(super) struct DryRun {
+    output: String,
+    draws: u64,
+    arrays: Vec<Array>,
+    /// About how many, where they are text.
+    bytes: u64,
+    /// How many chunks there would be, and how many draws each has; nothing of a single file.
+    chunks: Option<(u64, u64)>,
+    /// The share of candidates that are accepted.
+    acceptance: f64,
+    engine: String,
+    /// In a short trial, of the drawing alone.
+    draws_per_second: f64,
+    /// Free bytes where it would be; nothing of standard output, nor where there is no such folder.
+    free: Option<u64>,
+    #[serde(skip)]
     target: Target,
-    schema: &Schema,
-    recipe: &Recipe,
-    engine: &Engine,
-) -> anyhow::Result<()> {
-    let mut out = std::io::stdout();
-    writeln!(out, "{}: {} draws", output.output.display(), grouped(schema.count))?;
-    for field in &schema.fields {
-        writeln!(out, "  {}: {:?} {}", field.name, field.shape(schema.count), field.stored.name())?;
+}
+
+#[derive(Serialize)]
+struct Array {
+    name: String,
+    shape: Vec<u64>,
+    dtype: &'static str,
+}
+
+impl DryRun {
+    pub(super) fn new(
+        output: &OutputArguments,
+        target: Target,
+        schema: &Schema,
+        recipe: &Recipe,
+        engine: &Engine,
+    ) -> anyhow::Result<DryRun> {
+        let array = |field: &Field| Array {
+            name: field.name.clone(),
+            shape: field.shape(schema.count),
+            dtype: field.stored.name(),
+        };
+        let is_text = matches!(target, Target::Stdout | Target::Spd | Target::File(Format::Csv));
+        let row = match is_text {
+            true => schema.fields.iter().map(|field| TEXT * field.width as u64).sum(),
+            false => schema.row_bytes(),
+        };
+        let chunks = match target {
+            Target::Set(layout) => {
+                let plan = output.plan(layout, schema);
+                Some((plan.chunks(), plan.chunk))
+            }
+            _ => None,
+        };
+        Ok(DryRun {
+            output: output.output.display().to_string(),
+            draws: schema.count,
+            arrays: schema.fields.iter().map(array).collect(),
+            bytes: schema.count.saturating_mul(row),
+            chunks,
+            acceptance: recipe.acceptance(),
+            engine: engine.to_string(),
+            draws_per_second: rate(recipe, engine)?,
+            free: if target == Target::Stdout { None } else { free(&output.output) },
+            target,
+        })
     }
-    let bytes = schema.count * schema.row_bytes();
-    match target {
-        Target::Set(layout) => {
-            let plan = output.plan(layout, schema);
-            let chunks = grouped(plan.chunks());
-            writeln!(out, "  {} in {chunks} chunks of {} draws", size(bytes), grouped(plan.chunk))?;
+
+    pub(super) fn print(&self, json: bool) -> anyhow::Result<()> {
+        let mut out = std::io::stdout();
+        if json {
+            return Ok(writeln!(out, "{}", serde_json::to_string_pretty(self)?)?);
         }
-        Target::Spd => writeln!(out, "  {} files of text", grouped(schema.count))?,
-        Target::Stdout | Target::File(_) => writeln!(out, "  {}", size(bytes))?,
+        writeln!(out, "{}: {} draws", self.output, grouped(self.draws))?;
+        for Array { name, shape, dtype } in &self.arrays {
+            writeln!(out, "  {name}: {shape:?} {dtype}")?;
+        }
+        let bytes = size(self.bytes);
+        match (self.chunks, self.target) {
+            (Some((chunks, draws)), _) => {
+                writeln!(out, "  {bytes} in {} chunks of {} draws", grouped(chunks), grouped(draws))?;
+            }
+            (None, Target::Spd) => writeln!(out, "  {} files of text", grouped(self.draws))?,
+            (None, Target::Stdout | Target::File(Format::Csv)) => writeln!(out, "  about {bytes} of text")?,
+            (None, _) => writeln!(out, "  {bytes}")?,
+        }
+        let (engine, accepted) = (&self.engine, 100.0 * self.acceptance);
+        writeln!(out, "  drawn by {engine}, about {accepted:.2} % of the candidates accepted")?;
+        let (rate, seconds) = (self.draws_per_second / 1e6, self.draws as f64 / self.draws_per_second);
+        writeln!(out, "  {seconds:.1} s of drawing at {rate:.1} million a second, besides the writing")?;
+        if self.target != Target::Stdout {
+            writeln!(out, "  {}", room(Path::new(&self.output), self.bytes))?;
+        }
+        Ok(())
     }
-    writeln!(
-        out,
-        "  drawn by {engine}, about {:.2} % of the candidates accepted",
-        100.0 * recipe.acceptance()
-    )?;
-    let rate = rate(recipe, engine)?;
-    let seconds = schema.count as f64 / rate;
-    writeln!(out, "  {seconds:.1} s to draw at {:.1} million a second", rate / 1e6)?;
-    if target != Target::Stdout {
-        writeln!(out, "  {}", room(&output.output, bytes)?)?;
-    }
-    Ok(())
 }
 
 /// Draws a second, of a short trial.
@@ -64,15 +128,25 @@ fn rate(recipe: &Recipe, engine: &Engine) -> anyhow::Result<f64> {
     }
 }
 
+/// Free bytes in the folder of a path, if there is such a folder.
+fn free(path: &Path) -> Option<u64> {
+    fs4::available_space(folder(path)).ok()
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// Whether the disk has room.
-pub(super) fn room(path: &Path, bytes: u64) -> anyhow::Result<String> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        return Ok(format!("{folder:?} does not exist: create it first"));
+pub(super) fn room(path: &Path, bytes: u64) -> String {
+    let folder = folder(path);
+    match free(path) {
+        Some(free) => {
+            let enough = if free > bytes { "enough" } else { "not enough" };
+            format!("{} are free in {folder:?}, which is {enough}", size(free))
+        }
+        None => format!("{folder:?} does not exist: create it first"),
     }
-    let free = fs4::available_space(folder)?;
-    let enough = if free > bytes { "enough" } else { "not enough" };
-    Ok(format!("{} are free in {folder:?}, which is {enough}", size(free)))
 }
 
 /// Bytes in the unit that suits them.

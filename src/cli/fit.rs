@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 fn report(model: &Model, data: &Dataset, path: &Path) {
     let explained: f64 = model.parts().explained_variance.iter().sum();
-    eprintln!(
+    tell!(
         "{}: {} components explain {:.2} % of {} {}s at {} nm",
         path.display(),
         model.components(),

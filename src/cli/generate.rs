@@ -2,10 +2,13 @@
 
 use std::fs;
 use std::io::{self, Write};
+use std::iter;
 use std::path::PathBuf;
 
 use clap::Command;
 use clap_complete::Shell;
+use clap_mangen::Man;
+use spectroll::output::{Existing, OutputError, write_file};
 
 /// Print completions for a shell
 #[derive(clap::Args)]
@@ -29,12 +32,17 @@ pub(crate) fn completions(mut command: Command, arguments: &CompletionsArguments
     Ok(io::stdout().write_all(&text)?)
 }
 
-pub(crate) fn man(command: Command, arguments: &ManArguments) -> anyhow::Result<()> {
-    match &arguments.folder {
-        Some(folder) => {
-            fs::create_dir_all(folder)?;
-            Ok(clap_mangen::generate_to(command, folder)?)
-        }
-        None => Ok(clap_mangen::Man::new(command).render(&mut io::stdout())?),
+pub(crate) fn man(mut command: Command, arguments: &ManArguments) -> anyhow::Result<()> {
+    let Some(folder) = &arguments.folder else {
+        return Ok(Man::new(command).render(&mut io::stdout())?);
+    };
+    fs::create_dir_all(folder).map_err(|source| OutputError::Write { path: folder.clone(), source })?;
+    command.build();
+    for command in iter::once(&command).chain(command.get_subcommands().filter(|c| c.get_name() != "help")) {
+        let page = Man::new(command.clone());
+        let mut text = Vec::new();
+        page.render(&mut text)?;
+        write_file(&folder.join(page.get_filename()), Existing::Replace, &text)?;
     }
+    Ok(())
 }

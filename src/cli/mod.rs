@@ -1,6 +1,15 @@
 //! The command line: a module a command. Each takes its arguments and returns an error, which is printed here, once,
 //! with the exit code that its kind has.
 
+/// Prints a line on standard error. Unlike `eprintln` it does not panic where nobody can read that: what was done is
+/// done.
+macro_rules! tell {
+    ($($arguments:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($arguments)*);
+    }};
+}
+
 mod adapters;
 mod bench;
 mod config;
@@ -26,6 +35,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use spectroll::output::{Existing, OutputError};
@@ -96,7 +106,7 @@ struct EngineArguments {
     #[arg(long, value_name = "NAME|INDEX")]
     adapter: Option<String>,
     /// How many threads the CPU draws with [default: one a core]
-    #[arg(short, long, value_name = "N")]
+    #[arg(short, long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
     threads: Option<NonZeroUsize>,
 }
 
@@ -122,16 +132,35 @@ struct Interrupted(String);
 #[error("{0}")]
 struct Unverified(String);
 
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// Whether somebody asked for an end. Nothing until [`watch_interrupts`].
+static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From here on Ctrl-C is for [`check_interrupt`] to see; before, it ends the program.
+/// From here on Ctrl-C and the like are for [`check_interrupt`] to see; before, they end the program. What whoever
+/// started it ignores, as `nohup` does the end of a terminal, stays ignored.
 fn watch_interrupts() {
-    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed)).expect("this is the only handler");
+    let flag = INTERRUPTED.get_or_init(Arc::default);
+    let ignored = ignored_signals();
+    for &signal in SIGNALS.iter().filter(|&&signal| ignored >> (signal - 1) & 1 == 0) {
+        signal_hook::flag::register(signal, flag.clone()).expect("it is a signal that can be handled");
+    }
+}
+
+#[cfg(unix)]
+const SIGNALS: [i32; 3] =
+    [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP];
+#[cfg(not(unix))]
+const SIGNALS: [i32; 2] = [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM];
+
+/// The signals that are ignored, signal n as bit n - 1; none where that cannot be told.
+fn ignored_signals() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
 }
 
 /// An error once Ctrl-C was pressed: long work asks from time to time.
 fn check_interrupt() -> Result<(), Interrupted> {
-    match INTERRUPTED.load(Ordering::Relaxed) {
+    match INTERRUPTED.get().is_some_and(|flag| flag.load(Ordering::Relaxed)) {
         true => Err(Interrupted("nothing was left behind".to_owned())),
         false => Ok(()),
     }
@@ -146,7 +175,7 @@ pub(crate) fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS, // the reader has what it wanted
         Err(error) => {
-            eprintln!("error: {error}"); // our messages hold their causes
+            tell!("error: {error}"); // our messages hold their causes
             ExitCode::from(exit_code(&error))
         }
     }
@@ -224,6 +253,12 @@ fn existing(force: bool) -> Existing {
     if force { Existing::Replace } else { Existing::Keep }
 }
 
+/// How many threads: more than any machine has cores would only take long to start.
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let threads = text.parse().ok().filter(|threads| (1..=1024).contains(threads));
+    threads.and_then(NonZeroUsize::new).ok_or_else(|| "expected 1 to 1024".to_owned())
+}
+
 /// A count: digits, with `_` between them as one likes, or a whole number like 1e6.
 fn count(text: &str) -> Result<u64, String> {
     let digits = text.replace('_', "");
@@ -231,7 +266,7 @@ fn count(text: &str) -> Result<u64, String> {
         return Ok(count);
     }
     match digits.parse::<f64>() {
-        Ok(value) if value >= 0.0 && value.fract() == 0.0 && value < 9e15 => Ok(value as u64),
+        Ok(value) if value >= 0.0 && value.fract() == 0.0 && value < 2f64.powi(64) => Ok(value as u64),
         _ => Err("expected a whole number, like 1000000 or 1e6".to_owned()),
     }
 }

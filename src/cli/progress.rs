@@ -65,7 +65,7 @@ impl Progress {
 
     fn line(&self) {
         let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(0));
-        eprintln!(
+        tell!(
             "{:.1} %  {} of {}  {:.1} million/s  {} left",
             100.0 * done as f64 / all.max(1) as f64,
             grouped(done),

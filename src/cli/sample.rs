@@ -9,7 +9,7 @@ use serde::Serialize;
 use spectroll::output::{Outcome, Schema};
 use spectroll::{Choice, Drawer, Draws, Engine, EngineError, Recipe, Stream, Summary};
 
-use super::dry_run;
+use super::dry_run::DryRun;
 use super::request::{self, Request};
 use super::run::{Run, Source, Window};
 use super::sink::OutputArguments;
@@ -25,13 +25,13 @@ pub(crate) struct Arguments {
     #[arg(value_name = "MODEL")]
     model: String,
     /// How many spectra (1000000 and 1e6 are the same)
-    #[arg(short = 'n', long, value_name = "COUNT", value_parser = count)]
+    #[arg(short = 'n', long, value_name = "COUNT", value_parser = count, allow_negative_numbers = true)]
     count: u64,
     /// The seed of the random numbers
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     seed: u64,
     /// The index of the first draw
-    #[arg(long, default_value_t = 0, value_parser = count)]
+    #[arg(long, default_value_t = 0, value_parser = count, allow_negative_numbers = true)]
     start: u64,
     /// A name that sets these draws apart from others of the same seed
     #[arg(long, value_name = "NAME")]
@@ -90,7 +90,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
     if arguments.dry_run {
-        return dry_run::report(&arguments.output, target, &schema, &recipe, &engine);
+        let dry_run = DryRun::new(&arguments.output, target, &schema, &recipe, &engine)?;
+        return dry_run.print(arguments.json);
     }
     let why = match (&choice, engine.adapter()) {
         (Choice::Auto, None) => ", no graphics hardware was found",
@@ -184,19 +185,19 @@ fn report(arguments: &Arguments, outcome: Outcome, made: &Report) -> anyhow::Res
     } else if !arguments.quiet {
         let Summary { draws, attempts, above_one } = made.summary;
         let accepted = made.acceptance.map_or(String::new(), |a| format!(" ({:.4} % accepted)", 100.0 * a));
-        eprintln!("{}: {} spectra of {} bands", made.output, grouped(draws), made.bands);
-        eprintln!("  {} candidates{accepted}", grouped(attempts));
+        tell!("{}: {} spectra of {} bands", made.output, grouped(draws), made.bands);
+        tell!("  {} candidates{accepted}", grouped(attempts));
         if above_one > 0 {
             let share = 100.0 * above_one as f64 / draws as f64;
-            eprintln!("  {} spectra ({share:.2} %) reach 1 or more after scaling", grouped(above_one));
+            tell!("  {} spectra ({share:.2} %) reach 1 or more after scaling", grouped(above_one));
         }
         let rate = match draws {
             ..100_000 => String::new(), // starting up is most of so short a run
             _ => format!("{:.2} million a second, ", made.draws_per_second / 1e6),
         };
-        eprintln!("  {:.2} s, {rate}{}", made.seconds, made.engine);
+        tell!("  {:.2} s, {rate}{}", made.seconds, made.engine);
         if let Outcome::Waiting { done, chunks } = outcome {
-            eprintln!(
+            tell!(
                 "  {} of {} chunks are finished: the set gets its name with the last",
                 grouped(done),
                 grouped(chunks)

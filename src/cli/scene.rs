@@ -231,19 +231,19 @@ impl Job<'_> {
             writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
         } else if !self.arguments.quiet {
             let (count, bands) = (grouped(self.count()), self.scene.grid().len());
-            eprintln!("{}: {count} scenes of {bands} bands", self.arguments.output.output.display());
+            tell!("{}: {count} scenes of {bands} bands", self.arguments.output.output.display());
             for GroupSummary { group, summary } in &report.drawn {
                 let accepted = summary.acceptance().map_or_else(String::new, |share| {
                     format!(", {} candidates ({:.2} % accepted)", grouped(summary.attempts), 100.0 * share)
                 });
-                eprintln!("  {group}: {} spectra drawn{accepted}", grouped(summary.draws));
+                tell!("  {group}: {} spectra drawn{accepted}", grouped(summary.draws));
                 if summary.above_one > 0 {
-                    eprintln!("    {} of them reach 1 or more after scaling", grouped(summary.above_one));
+                    tell!("    {} of them reach 1 or more after scaling", grouped(summary.above_one));
                 }
             }
-            eprintln!("  {seconds:.2} s, {}", report.engine);
+            tell!("  {seconds:.2} s, {}", report.engine);
             if let Outcome::Waiting { done, chunks } = outcome {
-                eprintln!("  {} of {} chunks are finished", grouped(done), grouped(chunks));
+                tell!("  {} of {} chunks are finished", grouped(done), grouped(chunks));
             }
         }
         Ok(())
@@ -322,7 +322,7 @@ impl Job<'_> {
         )?;
         let output = &self.arguments.output;
         if !output.to_stdout() && !output.output.as_os_str().is_empty() {
-            writeln!(out, "  {}", room(&output.output, outline.bytes)?)?;
+            writeln!(out, "  {}", room(&output.output, outline.bytes))?;
         }
         Ok(())
     }

@@ -76,10 +76,10 @@ pub(crate) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
     }
     if !arguments.quiet {
         let (done, all) = (grouped(chunks.len() as u64), grouped(audit.plan().chunks()));
-        eprintln!("{}: {done} of {all} chunks are as they were written", arguments.path.display());
+        tell!("{}: {done} of {all} chunks are as they were written", arguments.path.display());
         match left {
-            Some(reason) => eprintln!("  none of them drawn again: {reason}"),
-            None => eprintln!("  {} of them drawn again, with the same bytes", grouped(again.len() as u64)),
+            Some(reason) => tell!("  none of them drawn again: {reason}"),
+            None => tell!("  {} of them drawn again, with the same bytes", grouped(again.len() as u64)),
         }
     }
     Ok(())

@@ -170,7 +170,10 @@ impl Reader<'_> {
         let base = self.base(section, Some((1, flat)))?;
         let bounds = section.get("bounds");
         if let Some(entry) = bounds.as_ref().filter(|_| !matches!(aim, Aim::Lrv(_))) {
-            let with = "without an lrv: a spectrum of given tristimulus values is not scaled";
+            let with = match aim {
+                Aim::Flat(_) => "for a flat target, which is the same in every band and never out of bounds",
+                _ => "without an lrv: a spectrum of given tristimulus values is not scaled",
+            };
             return Err(entry.wrong(Problem::Pointless { with }));
         }
         let names = [("base", Bounds::Base), ("scaled", Bounds::Scaled), ("both", Bounds::Both)];
