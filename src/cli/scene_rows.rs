@@ -223,6 +223,10 @@ fn field(array: &Array) -> Field {
         Some(axis) => Field::vector(&array.name, axis, last, element(array)),
         None => Field::scalar(&array.name, element(array)),
     };
+    let field = match array.interval {
+        Some(interval) => field.within(interval),
+        None => field,
+    };
     match axes(array).first() {
         Some(outer) if array.shape.len() > usize::from(inner.is_some()) => {
             field.repeated(outer, array.shape[0])

@@ -6,12 +6,14 @@ use crate::dataset::Kind;
 use crate::grid::Grid;
 use crate::level::{self, Level};
 use crate::model::{Model, Parts};
+use crate::program::Bounds;
+use crate::quantity::Interval;
 use crate::recipe::{Intensity, Recipe, RecipeBuilder, RecipeError};
 use crate::stream::Stream;
 
 use super::aim::{Aimed, key};
 use super::error::{Fault, Problem};
-use super::group::{Aim, Base, Group, Illuminants, Levels, Sharing, Targets};
+use super::group::{Aim, Base, Group, Illuminants, Sharing, Targets};
 
 /// A group as it is drawn.
 pub(super) struct Cast {
@@ -74,6 +76,9 @@ pub struct Array {
     pub per_scene: bool,
     /// The extents of an entry. Spectra have (count, bands), and other quantities one of them or none.
     pub shape: Vec<usize>,
+    /// What its values are between, if they are spectra.
+    #[serde(skip)]
+    pub interval: Option<Interval>,
 }
 
 /// What an array holds.
@@ -246,11 +251,18 @@ fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: us
     let base = group.base();
     let count = base.count as usize;
     let once = matches!(shapes, Shapes::Once(_));
+    let interval = match group {
+        Group::Illuminants(_) => Interval::Positive,
+        Group::Surfaces(_) => Interval::Unit,
+        Group::Targets(Targets { aim: Aim::Lrv(_), bounds: Bounds::Base, .. }) => Interval::Positive,
+        Group::Targets(_) => Interval::Unit,
+    };
     let array = |content: Content, per_scene, shape: &[usize]| Array {
         name: format!("{}{}", base.name, content.suffix()),
         content,
         per_scene,
         shape: shape.to_vec(),
+        interval: (content == Content::Spectra).then_some(interval),
     };
     let mut arrays = vec![array(Content::Spectra, !once || intensity.is_some(), &[count, bands])];
     match intensity.map(|intensity| intensity.sharing) {
@@ -264,7 +276,7 @@ fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: us
         if let Aim::Hue(_) = aim {
             arrays.push(array(Content::Xyz, true, &[count, 3]));
         }
-        flat = matches!(aim, Aim::Flat(Levels::Each(_) | Levels::Uniform(..)));
+        flat = matches!(aim, Aim::Flat(_));
     }
     if !flat {
         arrays.push(array(Content::Attempts, !once, &[count]));
