@@ -43,6 +43,9 @@ pub mod provenance;
 #[cfg(feature = "report")]
 pub mod costs;
 #[cfg(feature = "report")]
+#[doc(hidden)]
+pub mod plot;
+#[cfg(feature = "report")]
 pub mod statistics;
 #[cfg(feature = "report")]
 pub mod stress;

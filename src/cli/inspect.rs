@@ -10,6 +10,7 @@ use std::path::PathBuf;
 
 use spectroll::{Model, Normalization, Recipe, RecipeError};
 
+use super::picture_file;
 use super::request::Request;
 use super::{existing, grouped, picture};
 
@@ -38,12 +39,12 @@ pub(crate) struct Arguments {
 
 /// Prints the table, after making the picture where one is asked for.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let format = arguments.output.as_deref().map(picture::Format::of).transpose()?;
+    let format = arguments.output.as_deref().map(picture_file::format).transpose()?;
     let model = super::model(&arguments.model)?;
     let recipe = arguments.request.recipe(&model);
     if let (Some(path), Some(format)) = (&arguments.output, format) {
         let figure = picture::Picture { model: &model, recipe: recipe.as_ref().ok(), seed: arguments.seed };
-        figure.write(path, format, existing(arguments.force))?;
+        picture_file::write(&figure.drawing(), path, format, existing(arguments.force))?;
     }
     let table = table(&arguments.model, &model, &recipe);
     std::io::stdout().lock().write_all(table.as_bytes())?;

@@ -18,6 +18,7 @@ mod fit;
 mod generate;
 mod inspect;
 mod picture;
+mod picture_file;
 mod preview;
 mod progress;
 mod report;

@@ -3,20 +3,15 @@
 //! Every line of the last panel has the colour of its spectrum, because that is the quickest check there is: a model
 //! of surfaces that draws no browns, or one of daylights that draws green, is wrong before any number says so.
 
-use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::anyhow;
-use kuva::RasterBackend;
 use kuva::prelude::{
-    BandPlot, Figure, Layout, LinePlot, Plot, ReferenceLine, ScatterPlot, ShadedRegion, SvgBackend,
-    TextAnnotation, Theme, TickFormat,
+    BandPlot, Figure, Layout, LinePlot, Plot, ReferenceLine, ScatterPlot, ShadedRegion, TextAnnotation,
+    TickFormat,
 };
 use kuva::render::render::{Primitive, Scene, TextAnchor};
-use spectroll::output::{Existing, write_file};
+use spectroll::plot::{self, COLOURS, DARK, Heading, LABEL_SIZE, QUIET};
 use spectroll::{Grid, Kind, Model, Recipe, Stream, colorimetry};
-
-use super::Usage;
 
 /// The size of a panel; two by two make a picture.
 const PANEL: (f64, f64) = (480.0, 350.0);
@@ -24,20 +19,16 @@ const PANEL: (f64, f64) = (480.0, 350.0);
 /// What a panel leaves for text on its left, right, top and bottom: the same for all, so that their axes align.
 const MARGINS: [f64; 4] = [50.0, 16.0, 62.0, 46.0];
 
-const TITLE_SIZE: u32 = 16;
-const LABEL_SIZE: u32 = 12;
+const HEADING: Heading = Heading { title_size: 16, x: 10.0, title: 24.0, label: 45.0 };
 
 /// Between panels and around them.
 const GAP: f64 = 14.0;
-
-/// Pixels of a PNG for each unit of the SVG.
-const SCALE: f32 = 1.5;
 
 /// The draws in the last panel.
 const DRAWS: u64 = 200;
 
 /// The most basis vectors that are shown: beyond these they hide each other.
-const MAX_SHOWN: usize = 8;
+const MAX_SHOWN: usize = COLOURS.len();
 
 /// The most components whose cumulated variance is written beside its point.
 const MAX_LABELLED: usize = 8;
@@ -49,35 +40,7 @@ const LIGHT_LUMINANCE: f64 = 0.6;
 /// take all the room.
 const NOTHING: f64 = 1e-5;
 
-/// Colours of the components: those of Okabe and Ito, told apart by the colour-blind too, without their yellow.
-const COMPONENTS: [&str; MAX_SHOWN] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6b4c9a", "#7f7f7f"];
-
-const INK: &str = "#2b2f36";
-const DARK: &str = "#17181c";
-const QUIET: &str = "#8a9099";
-const LABEL_INK: &str = "#5b626c";
 const ACCENT: &str = "#3b5b7c";
-
-/// A format of pictures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Format {
-    /// Vectors.
-    Svg,
-    /// Pixels.
-    Png,
-}
-
-impl Format {
-    /// The format that the extension of `path` names.
-    pub(crate) fn of(path: &Path) -> anyhow::Result<Format> {
-        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("svg") => Ok(Format::Svg),
-            Some("png") => Ok(Format::Png),
-            _ => Err(Usage(format!("{path:?}: a picture is an .svg or a .png file; name it so")).into()),
-        }
-    }
-}
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug)]
@@ -94,20 +57,8 @@ pub(crate) struct Picture<'a> {
 type Panel = (Vec<Plot>, Layout);
 
 impl Picture<'_> {
-    /// Writes the picture, which appears only when it is complete.
-    pub(crate) fn write(&self, path: &Path, format: Format, existing: Existing) -> anyhow::Result<()> {
-        let scene = self.scene();
-        let bytes = match format {
-            Format::Svg => SvgBackend::new().render_scene(&scene).into_bytes(),
-            Format::Png => RasterBackend::new()
-                .with_scale(SCALE)
-                .render_scene(&scene)
-                .map_err(|e| anyhow!("cannot draw {path:?}: {e}"))?,
-        };
-        Ok(write_file(path, existing, &bytes)?)
-    }
-
-    fn scene(&self) -> Scene {
+    /// The picture, drawn.
+    pub(crate) fn drawing(&self) -> Scene {
         let draws = self.draws();
         let panels = [self.mean(), self.basis(), self.unexplained(), self.drawn(&draws)];
         let (plots, layouts) = panels.into_iter().unzip();
@@ -118,7 +69,7 @@ impl Picture<'_> {
             .with_spacing(GAP)
             .with_padding(GAP)
             .render();
-        scene.elements.iter_mut().for_each(set_heading);
+        HEADING.set(&mut scene);
         scene.elements.extend(self.key((2.0 * GAP + PANEL.0, GAP)));
         scene
     }
@@ -158,7 +109,7 @@ impl Picture<'_> {
         let line = |(index, row): (usize, &Vec<f64>)| {
             LinePlot::new()
                 .with_data(curve(grid, row))
-                .with_color(COMPONENTS[index])
+                .with_color(COLOURS[index])
                 .with_stroke_width(if index == 0 { 2.6 } else { 1.6 })
                 .into()
         };
@@ -185,39 +136,15 @@ impl Picture<'_> {
         let explained = &self.model.parts().explained_variance;
         let count = explained.len().min(MAX_SHOWN);
         let column = (PANEL.0 - left - right) / KEY_COLUMNS as f64;
-        let mut elements = vec![Primitive::Rect {
-            x: x + left + 1.0,
-            y: y + top - 1.0,
-            width: PANEL.0 - left - right,
-            height: key_height(count),
-            fill: "#ffffff".into(),
-            stroke: None,
-            stroke_width: None,
-            opacity: None,
-        }];
+        let (width, height) = (PANEL.0 - left - right, key_height(count));
+        let mut elements = vec![plot::rectangle((x + left + 1.0, y + top - 1.0), (width, height), "#ffffff")];
         for (index, share) in explained.iter().take(count).enumerate() {
             let (row, place) = (index / key_columns(count), index % key_columns(count));
             let x = x + left + 8.0 + column * place as f64;
             let y = y + top + 8.0 + KEY_ROW * row as f64;
-            elements.push(Primitive::Line {
-                x1: x,
-                y1: y,
-                x2: x + 20.0,
-                y2: y,
-                stroke: COMPONENTS[index].into(),
-                stroke_width: 2.6,
-                stroke_dasharray: None,
-            });
-            elements.push(Primitive::Text {
-                x: x + 27.0,
-                y: y + 4.0,
-                content: format!("{}: {}", index + 1, percent(*share)),
-                size: LABEL_SIZE - 1,
-                anchor: TextAnchor::Start,
-                rotate: None,
-                bold: false,
-                color: None,
-            });
+            elements.push(plot::mark((x, y), 20.0, COLOURS[index], 2.6, None));
+            let name = format!("{}: {}", index + 1, percent(*share));
+            elements.push(plot::text((x + 27.0, y + 4.0), LABEL_SIZE - 1, &name, TextAnchor::Start, None));
         }
         elements
     }
@@ -235,7 +162,7 @@ impl Picture<'_> {
         let lowest = shown.iter().fold(100.0, |a: f64, p| a.min(p.1));
         let floor = 10f64.powf((lowest / 1.5).log10().floor());
         let colour = |&(x, _): &(f64, f64)| match x as usize {
-            k @ 1..=MAX_SHOWN => COMPONENTS[k - 1],
+            k @ 1..=MAX_SHOWN => COLOURS[k - 1],
             _ => QUIET,
         };
         let line = LinePlot::new().with_data(shown.clone()).with_color(QUIET).with_stroke_width(1.4);
@@ -351,8 +278,7 @@ impl Colours {
             Colours::Emitted(weights) => shown_light(xyz(weights)),
             Colours::Unseen => return QUIET.to_owned(),
         };
-        let [r, g, b] = colorimetry::encode_srgb(linear);
-        format!("#{r:02x}{g:02x}{b:02x}")
+        plot::exact_hex(linear)
     }
 }
 
@@ -432,19 +358,6 @@ fn key_height(count: usize) -> f64 {
     count.div_ceil(KEY_COLUMNS) as f64 * KEY_ROW + 4.0
 }
 
-/// Moves titles, and the names of y axes, to the upper left corner of their panel, level: turned text is drawn badly
-/// by the rasterizer, and read badly anywhere.
-fn set_heading(element: &mut Primitive) {
-    if let Primitive::Text { x, y, size, anchor, rotate, color, .. } = element {
-        let is_title = *size == TITLE_SIZE;
-        if is_title || rotate.is_some() {
-            (*x, *y) = (10.0, if is_title { 24.0 } else { 45.0 });
-            (*anchor, *rotate) = (TextAnchor::Start, None);
-            *color = (!is_title).then(|| LABEL_INK.into());
-        }
-    }
-}
-
 /// A value of a spectrum, short enough for the left margin.
 fn spectral_value(value: f64) -> String {
     if value.abs() < 1e5 { TickFormat::Auto.format(value) } else { TickFormat::Sci.format(value) }
@@ -457,26 +370,7 @@ fn decimal(value: f64) -> String {
 
 /// Axes with exactly these limits, in the style that all panels share.
 fn panel(x: (f64, f64), y: (f64, f64)) -> Layout {
-    let theme = Theme {
-        axis_color: INK.into(),
-        tick_color: INK.into(),
-        text_color: INK.into(),
-        grid_color: "#e6e8eb".into(),
-        legend_border: "none".into(),
-        ..Theme::light()
-    };
-    let [left, right, top, bottom] = MARGINS;
-    Layout::new(x, y)
-        .with_x_axis_min(x.0)
-        .with_x_axis_max(x.1)
-        .with_y_axis_min(y.0)
-        .with_y_axis_max(y.1)
-        .with_theme(theme)
-        .with_force_margins(left, right)
-        .with_force_margins_y(top, bottom)
-        .with_title_size(TITLE_SIZE)
-        .with_label_size(LABEL_SIZE)
-        .with_tick_size(LABEL_SIZE - 1)
+    plot::axes(x, y, MARGINS, HEADING.title_size)
 }
 
 #[cfg(test)]
@@ -486,7 +380,7 @@ mod tests {
     fn svg(model: &Model) -> String {
         let recipe = Recipe::new(model).build();
         let picture = Picture { model, recipe: recipe.as_ref().ok(), seed: 0 };
-        SvgBackend::new().render_scene(&picture.scene())
+        plot::svg(&picture.drawing())
     }
 
     #[test]
@@ -526,13 +420,5 @@ mod tests {
     fn percentages_have_the_decimals_that_matter() {
         let shares = [0.787, 0.9976, 0.00208, 1.0, 0.99995, 1.0 - 1e-9];
         assert_eq!(shares.map(percent), ["78.7 %", "99.76 %", "0.21 %", "100 %", "99.995 %", "100 %"]);
-    }
-
-    #[test]
-    fn a_picture_is_named_svg_or_png() {
-        assert_eq!(Format::of(Path::new("a.PNG")).unwrap(), Format::Png);
-        assert_eq!(Format::of(Path::new("a.b.svg")).unwrap(), Format::Svg);
-        let message = Format::of(Path::new("a.jpg")).unwrap_err().to_string();
-        assert!(message.contains(".svg or a .png"), "{message}");
     }
 }

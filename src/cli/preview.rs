@@ -5,17 +5,11 @@
 //! scenes of a wide range of intensities would be black or white.
 
 use std::ops::Range;
-use std::path::Path;
 
-use anyhow::anyhow;
-use kuva::RasterBackend;
-use kuva::prelude::SvgBackend;
 use kuva::render::render::{Primitive, Scene as Drawing, TextAnchor};
-use spectroll::output::{Existing, write_file};
+use spectroll::plot::{self, DARK, INK, PALE, QUIET, line, rectangle};
 use spectroll::scene::{Content, Role, Scene, Window};
 use spectroll::{Engine, EngineError, Grid, colorimetry};
-
-use super::picture::Format;
 
 /// Tiles in a row, and rows of them.
 const TILES: (usize, usize) = (5, 2);
@@ -45,11 +39,6 @@ const DIAGRAM: f64 = 470.0;
 /// The ends of its axes.
 const X: (f64, f64) = (0.0, 0.8);
 const Y: (f64, f64) = (0.0, 0.9);
-
-const SCALE: f32 = 1.5;
-const INK: &str = "#2b2f36";
-const QUIET: &str = "#8a9099";
-const DARK: &str = "#17181c";
 
 /// Scenes, and what they look like.
 pub(super) struct Preview {
@@ -143,20 +132,8 @@ impl Preview {
         self.targets.extend(targets.iter().take(each).map(|&xyz| point(xyz)));
     }
 
-    /// Writes the picture, which appears only when it is complete.
-    pub(super) fn write(&self, path: &Path, format: Format, existing: Existing) -> anyhow::Result<()> {
-        let drawing = self.drawing();
-        let bytes = match format {
-            Format::Svg => SvgBackend::new().render_scene(&drawing).into_bytes(),
-            Format::Png => RasterBackend::new()
-                .with_scale(SCALE)
-                .render_scene(&drawing)
-                .map_err(|e| anyhow!("cannot draw {path:?}: {e}"))?,
-        };
-        Ok(write_file(path, existing, &bytes)?)
-    }
-
-    fn drawing(&self) -> Drawing {
+    /// The picture, drawn.
+    pub(super) fn drawing(&self) -> Drawing {
         let rows = self.tiles.len().div_ceil(TILES.0).max(1);
         let width = TILES.0 as f64 * (TILE.0 + GAP) + DIAGRAM + 2.0 * GAP;
         let height = HEAD + (rows as f64 * (TILE.1 + CAPTION + GAP)).max(DIAGRAM);
@@ -250,7 +227,7 @@ impl Tile {
         }
         let top = y + if self.lights.is_empty() { 0.0 } else { STRIP + 4.0 };
         let chip = (TILE.0 / CHIPS.0 as f64, (y + TILE.1 - top) / CHIPS.1 as f64);
-        all.push(rectangle((x, top), (TILE.0, y + TILE.1 - top), "#e6e8eb"));
+        all.push(rectangle((x, top), (TILE.0, y + TILE.1 - top), PALE));
         for (i, colour) in self.chips.iter().enumerate() {
             let at = (x + (i % CHIPS.0) as f64 * chip.0, top + (i / CHIPS.0) as f64 * chip.1);
             all.push(rectangle(at, chip, colour));
@@ -300,37 +277,12 @@ fn xyz(spectrum: &[f32], weights: &[Vec<f64>; 3]) -> [f64; 3] {
 
 /// The sRGB colour of tristimulus values, less light where a component would exceed 1.
 fn colour(xyz: [f64; 3]) -> String {
-    let linear = colorimetry::linear_srgb(xyz);
-    let largest = linear.into_iter().fold(1.0, f64::max);
-    let [r, g, b] = colorimetry::encode_srgb(linear.map(|v| v / largest));
-    format!("#{r:02x}{g:02x}{b:02x}")
+    plot::hex(colorimetry::linear_srgb(xyz))
 }
 
 fn point(xyz: [f64; 3]) -> Point {
     let sum: f64 = xyz.iter().sum();
     Point { x: xyz[0] / sum, y: xyz[1] / sum, colour: colour(xyz) }
-}
-
-fn rectangle((x, y): (f64, f64), (width, height): (f64, f64), fill: &str) -> Primitive {
-    Primitive::Rect {
-        x,
-        y,
-        width,
-        height,
-        fill: fill.into(),
-        stroke: None,
-        stroke_width: None,
-        opacity: None,
-    }
-}
-
-fn line(points: &[(f64, f64)], stroke: &str, stroke_width: f64) -> Primitive {
-    Primitive::PolyLine {
-        points: points.to_vec(),
-        stroke: stroke.into(),
-        stroke_width,
-        stroke_dasharray: None,
-    }
 }
 
 fn text(x: f64, y: f64, size: u32, content: &str) -> Primitive {
@@ -342,6 +294,5 @@ fn centred(x: f64, y: f64, size: u32, content: &str) -> Primitive {
 }
 
 fn label((x, y): (f64, f64), size: u32, content: &str, anchor: TextAnchor, colour: &str) -> Primitive {
-    let (content, color) = (content.to_owned(), Some(colour.into()));
-    Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color }
+    plot::text((x, y), size, content, anchor, Some(colour))
 }

@@ -9,10 +9,11 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use spectroll::Engine;
 use spectroll::output::{Outcome, Pending, Schema, SpdName};
+use spectroll::plot::Format;
 use spectroll::scene::{GroupSummary, Outline, PRESETS, Role, Scene};
 
 use super::dry_run::{room, size};
-use super::picture;
+use super::picture_file;
 use super::preview::Preview;
 use super::run::Run;
 use super::scene_rows::{self, Rows, Selection, element};
@@ -144,13 +145,14 @@ struct Job<'a> {
 /// A picture that can be written.
 struct Picture<'a> {
     path: &'a Path,
-    format: picture::Format,
+    format: Format,
 }
 
 impl Picture<'_> {
     fn make(&self, job: &Job, engine: &Engine) -> anyhow::Result<()> {
         let existing = existing(job.arguments.output.force);
-        Preview::new(job.scene, engine, &job.scenes)?.write(self.path, self.format, existing)
+        let drawing = Preview::new(job.scene, engine, &job.scenes)?.drawing();
+        picture_file::write(&drawing, self.path, self.format, existing)
     }
 }
 
@@ -175,7 +177,7 @@ impl Job<'_> {
 
     /// A picture of these scenes at `path`, if it can be written.
     fn picture<'p>(&self, path: &'p Path) -> anyhow::Result<Picture<'p>> {
-        let format = picture::Format::of(path)?;
+        let format = picture_file::format(path)?;
         if !self.arguments.dry_run {
             Pending::create(path, existing(self.arguments.output.force))?;
         }

@@ -2,32 +2,33 @@
 
 use std::sync::Arc;
 
-use kuva::prelude::{BandPlot, Layout, LinePlot, Plot, ScatterPlot, SvgBackend, Theme, TickFormat};
+use kuva::prelude::{BandPlot, Layout, LinePlot, Plot, ScatterPlot, TickFormat};
 use kuva::render::figure::Figure;
 use kuva::render::render::{Primitive, TextAnchor};
+
+use crate::plot::{self, Heading, LABEL_SIZE};
 
 /// The size of a chart, and what it leaves for text on its left, right and bottom.
 const SIZE: (f64, f64) = (640.0, 430.0);
 const MARGINS: [f64; 3] = [64.0, 18.0, 48.0];
 
 /// What is left above the axes for the title and the name of the vertical axis, and for each row of the key.
-const HEADING: f64 = 58.0;
+const HEAD: f64 = 58.0;
 const KEY_ROW: f64 = 18.0;
 
-const TITLE_SIZE: u32 = 15;
-const LABEL_SIZE: u32 = 12;
+const HEADING: Heading = Heading { title_size: 15, x: 12.0, title: 21.0, label: 40.0 };
 
 /// About the width of a character of the key.
 const CHARACTER: f64 = 6.2;
 
-const INK: &str = "#2b2f36";
-const LABEL_INK: &str = "#5b626c";
+/// For what only guides the eye.
+pub(super) const GUIDE: &str = plot::QUIET;
 
-/// Quiet, for what only guides the eye.
-pub(super) const GUIDE: &str = "#8a9099";
-
-/// Colours of Okabe and Ito, told apart by the colour-blind too.
-pub(super) const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#6b4c9a"];
+/// Those that show on thin lines.
+pub(super) const COLOURS: [&str; 6] = {
+    let all = plot::COLOURS;
+    [all[0], all[1], all[2], all[3], all[4], all[6]]
+};
 
 /// An axis.
 pub(super) struct Axis {
@@ -140,7 +141,7 @@ impl Chart {
     pub(super) fn svg(&self) -> String {
         let keys = self.keys();
         let rows = keys.iter().map(|key| key.row + 1).max().unwrap_or(0);
-        let top = HEADING + KEY_ROW * rows as f64;
+        let top = HEAD + KEY_ROW * rows as f64;
         let units = (self.x.unit(), self.y.unit());
         let plots: Vec<Plot> = self.series.iter().flat_map(|series| series.plots(units)).collect();
         let mut scene = Figure::new(1, 1)
@@ -150,39 +151,21 @@ impl Chart {
             .with_spacing(0.0)
             .with_padding(0.0)
             .render();
-        scene.elements.iter_mut().for_each(set_heading);
+        HEADING.set(&mut scene);
         for key in keys {
-            scene.elements.extend(key.draw(HEADING));
+            scene.elements.extend(key.draw(HEAD));
         }
-        SvgBackend::new().render_scene(&scene)
+        plot::svg(&scene)
     }
 
     fn layout(&self, top: f64) -> Layout {
-        let theme = Theme {
-            axis_color: INK.into(),
-            tick_color: INK.into(),
-            text_color: INK.into(),
-            grid_color: "#e6e8eb".into(),
-            legend_border: "none".into(),
-            ..Theme::light()
-        };
         let plotted = |axis: &Axis| (axis.limits.0 / axis.unit(), axis.limits.1 / axis.unit());
-        let ((x_low, x_high), (y_low, y_high)) = (plotted(&self.x), plotted(&self.y));
         let [left, right, bottom] = MARGINS;
-        let mut layout = Layout::new((x_low, x_high), (y_low, y_high))
-            .with_x_axis_min(x_low)
-            .with_x_axis_max(x_high)
-            .with_y_axis_min(y_low)
-            .with_y_axis_max(y_high)
-            .with_theme(theme)
-            .with_force_margins(left, right)
-            .with_force_margins_y(top, bottom)
+        let margins = [left, right, top, bottom];
+        let mut layout = plot::axes(plotted(&self.x), plotted(&self.y), margins, HEADING.title_size)
             .with_title(self.title.clone())
             .with_x_label(self.x.label.clone())
-            .with_y_label(self.y.label.clone())
-            .with_title_size(TITLE_SIZE)
-            .with_label_size(LABEL_SIZE)
-            .with_tick_size(LABEL_SIZE - 1);
+            .with_y_label(self.y.label.clone());
         if self.x.logarithmic {
             layout = layout.with_log_x().with_x_tick_format(powers(&self.x));
         }
@@ -230,43 +213,18 @@ impl Key<'_> {
                 stroke: None,
                 stroke_width: None,
             },
-            style => Primitive::Line {
-                x1: self.x,
-                y1: y,
-                x2: self.x + 22.0,
-                y2: y,
-                stroke: self.series.colour.into(),
-                stroke_width: 2.4,
-                stroke_dasharray: match style {
-                    Style::Dashed => Some("6 3".into()),
-                    Style::Dotted => Some("2 3".into()),
+            style => {
+                let dashes = match style {
+                    Style::Dashed => Some("6 3"),
+                    Style::Dotted => Some("2 3"),
                     _ => None,
-                },
-            },
+                };
+                plot::mark((self.x, y), 22.0, self.series.colour, 2.4, dashes)
+            }
         };
-        let text = Primitive::Text {
-            x: self.x + 28.0,
-            y: y + 4.0,
-            content: self.series.name.clone(),
-            size: LABEL_SIZE - 1,
-            anchor: TextAnchor::Start,
-            rotate: None,
-            bold: false,
-            color: None,
-        };
+        let (at, name) = ((self.x + 28.0, y + 4.0), &self.series.name);
+        let text = plot::text(at, LABEL_SIZE - 1, name, TextAnchor::Start, None);
         vec![mark, text]
-    }
-}
-
-/// Moves the title, and the name of the vertical axis, to the upper left corner, level: turned text reads badly.
-fn set_heading(element: &mut Primitive) {
-    if let Primitive::Text { x, y, size, anchor, rotate, color, .. } = element {
-        let is_title = *size == TITLE_SIZE;
-        if is_title || rotate.is_some() {
-            (*x, *y) = (12.0, if is_title { 21.0 } else { 40.0 });
-            (*anchor, *rotate) = (TextAnchor::Start, None);
-            *color = (!is_title).then(|| LABEL_INK.into());
-        }
     }
 }
 

@@ -1,0 +1,22 @@
+//! Pictures as files, for the commands that make some.
+
+use std::path::Path;
+
+use anyhow::anyhow;
+use kuva::render::render::Scene;
+use spectroll::output::{Existing, write_file};
+use spectroll::plot::Format;
+
+use super::Usage;
+
+/// The format that the extension of `path` names.
+pub(super) fn format(path: &Path) -> Result<Format, Usage> {
+    let unknown = || Usage(format!("{path:?}: a picture is an .svg or a .png file; name it so"));
+    Format::of(path).ok_or_else(unknown)
+}
+
+/// Writes a picture, which appears only when it is complete.
+pub(super) fn write(drawing: &Scene, path: &Path, format: Format, existing: Existing) -> anyhow::Result<()> {
+    let bytes = format.bytes(drawing).map_err(|e| anyhow!("cannot draw {path:?}: {e}"))?;
+    Ok(write_file(path, existing, &bytes)?)
+}
