@@ -42,6 +42,11 @@ pub enum FitError {
         "{place}: its mean power is {power}, and only a positive one can be normalised; remove it or pass --normalize none"
     )]
     Power { place: String, power: f64 },
+    #[error(
+        "reflectances of {mean:.4} on average, where they are between 0 and 1: divide percents by 100, or fit these as \
+         illuminants"
+    )]
+    NotReflectances { mean: f64 },
     #[error("the values are too large or too small to square in f64: rescale the data, or normalise")]
     Scale,
 }
@@ -77,6 +82,10 @@ impl Fit {
             return Err(FitError::TooFewSpectra { components: k, spectra });
         }
         let (mut centred, powers) = self.normalized(data)?;
+        let mean = centred.mean();
+        if self.kind == Kind::Reflectance && mean.is_finite() && mean > 1.0 {
+            return Err(FitError::NotReflectances { mean });
+        }
         let mean = centred.column_mean(); // eq. 2, 6
         centred.column_iter_mut().for_each(|mut spectrum| spectrum -= &mean);
 
@@ -165,6 +174,17 @@ mod tests {
     use super::*;
     use crate::dataset::Table;
     use crate::grid::{Extend, Grid};
+
+    #[test]
+    fn percents_are_no_reflectances() {
+        let percents: Vec<_> =
+            (0..9).map(|i| vec![40.0 + f64::from(i), 50.0, 60.0 - f64::from(i * i)]).collect();
+        let table = Table::new("percents.csv", vec![400.0, 410.0, 420.0], &percents).unwrap();
+        let data = Dataset::new(&[table], Grid::new(400.0, 10.0, 3).unwrap(), Extend::Error).unwrap();
+        let message = Fit::new(Kind::Reflectance).components(2).fit(&data).unwrap_err().to_string();
+        assert!(message.contains("divide percents by 100"), "{message}");
+        assert!(Fit::new(Kind::Illuminant).components(2).fit(&data).is_ok());
+    }
 
     #[test]
     fn a_spectrum_that_cannot_be_normalised_is_named_by_its_source() {

@@ -312,6 +312,17 @@ fn what_is_in_the_way_is_named() {
     succeeds(folder, "verify empty.zarr");
 }
 
+#[test]
+fn what_is_not_there_is_not_taken_for_a_broken_set() {
+    let folder = tempfile::tempdir().unwrap();
+    fails(folder.path(), "verify nothing.zarr", 1, "\"nothing.zarr\" does not exist");
+    fails(folder.path(), "merge nothing.zarr", 1, "\"nothing.zarr\" does not exist");
+    succeeds(folder.path(), "sample granada -n 100 --engine cpu -o a.zarr --chunk 50 --shard 1/2");
+    fails(folder.path(), "verify a.zarr", 1, "is not complete: its chunks are in \"a.zarr.partial\"");
+    fs::create_dir(folder.path().join("b.zarr")).unwrap();
+    fails(folder.path(), "verify b.zarr", 1, "it has no manifest");
+}
+
 /// Neither sees a manifest of the other when it begins.
 #[test]
 fn of_two_runs_that_start_at_once_one_is_refused() {

@@ -38,7 +38,7 @@ const LIGHT_LUMINANCE: f64 = 0.6;
 
 /// Shares of variance below this are not shown: on a logarithmic axis the rounding errors of a complete basis would
 /// take all the room.
-const NOTHING: f64 = 1e-5;
+const NOTHING: f64 = 1e-8;
 
 const ACCENT: &str = "#3b5b7c";
 

@@ -55,9 +55,10 @@ struct Tile {
     lights: Vec<String>,
     chips: Vec<String>,
     targets: Vec<String>,
-    /// The first of its targets'.
-    lrv: Option<f32>,
-    intensity: Option<f32>,
+    /// The least and the largest of its targets'.
+    lrv: Option<[f32; 2]>,
+    /// The same of its lights'.
+    intensity: Option<[f32; 2]>,
 }
 
 /// A colour and its chromaticity.
@@ -116,7 +117,9 @@ impl Preview {
             let known = |content: Content| {
                 let arrays = groups.iter().flat_map(|group| &group.arrays);
                 let array = arrays.into_iter().find(|array| array.content == content)?;
-                values.of(&array.name).first().copied()
+                let values = values.of(&array.name);
+                let least = values.iter().copied().reduce(f32::min)?;
+                Some([least, values.iter().copied().fold(least, f32::max)])
             };
             self.tiles.push(Tile {
                 lights: shone.iter().map(|xyz| colour(xyz.map(|v| 0.7 * v / brightest))).collect(),
@@ -238,12 +241,20 @@ impl Tile {
         for (i, colour) in self.targets.iter().enumerate() {
             all.push(rectangle((at.0 + i as f64 * width, at.1), (width, size.1), colour));
         }
-        let lrv = self.lrv.map(|lrv| format!("  LRV {lrv:.3}")).unwrap_or_default();
+        let lrv = self.lrv.map(|lrv| format!("  LRV {}", range(lrv))).unwrap_or_default();
         all.push(text(x, y + TILE.1 + 15.0, 12, &format!("scene {number}{lrv}")));
         if let Some(intensity) = self.intensity {
-            let text = format!("lights x {intensity:.3}");
+            let text = format!("lights x {}", range(intensity));
             all.push(label((x, y + TILE.1 + 29.0), 11, &text, TextAnchor::Start, QUIET));
         }
+    }
+}
+
+/// The ends of a range, or its only value.
+fn range([least, largest]: [f32; 2]) -> String {
+    match least == largest {
+        true => format!("{least:.3}"),
+        false => format!("{least:.3} to {largest:.3}"),
     }
 }
 

@@ -88,12 +88,28 @@ pub enum OutputError {
     Different { path: PathBuf, difference: String },
     #[error("{path:?} is damaged: {fault}; pass --force to make it again")]
     Damaged { path: PathBuf, fault: String },
-    #[error("{path:?} is not a data set of this program: it has no manifest")]
+    #[error("{}", not_a_set(path))]
     NotASet { path: PathBuf },
     #[error("cannot use the manifest {path:?}: {reason}")]
     Manifest { path: PathBuf, reason: String },
     #[error("{path:?} is not complete: {done} of {chunks} chunks are done")]
     Incomplete { path: PathBuf, done: u64, chunks: u64 },
+}
+
+fn not_a_set(path: &Path) -> String {
+    let partial = partial(path);
+    match (path.exists(), partial.is_dir()) {
+        (true, _) => format!("{path:?} is not a data set of this program: it has no manifest"),
+        (false, true) => format!("{path:?} is not complete: its chunks are in {partial:?}"),
+        (false, false) => format!("{path:?} does not exist"),
+    }
+}
+
+/// Where the chunks of a set are until it is complete.
+fn partial(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    PathBuf::from(name)
 }
 
 impl Format {

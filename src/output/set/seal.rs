@@ -4,8 +4,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::super::OutputError;
 use super::super::pending::{PREFIX, SUFFIX, folder, place_by, sweep, sync_folder};
+use super::super::{OutputError, partial};
 use super::manifest::{Manifest, SEALED, manifests, part_name, remove_parts};
 use super::{Plan, Shard, Start};
 
@@ -21,13 +21,6 @@ pub enum Outcome {
         /// Of how many.
         chunks: u64,
     },
-}
-
-/// Where the chunks of `path` are until it is complete.
-fn partial(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".partial");
-    PathBuf::from(name)
 }
 
 /// Sees to it that the set's folder is there, and that it may be written to. Returns where its chunks are: in `path`
@@ -113,8 +106,9 @@ pub(super) fn seal(path: &Path, replace: bool) -> Result<Outcome, OutputError> {
 
 fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<Outcome, OutputError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
-    let Some(manifest) = Manifest::joined(root)? else {
-        return Err(OutputError::NotASet { path: root.to_owned() });
+    let found = if root.is_dir() { Manifest::joined(root)? } else { None };
+    let Some(manifest) = found else {
+        return Err(OutputError::NotASet { path: if root.is_dir() { root } else { path }.to_owned() });
     };
     if !manifest.is_complete() {
         let (done, chunks) = (manifest.chunks.len() as u64, manifest.plan.chunks());
