@@ -136,27 +136,29 @@ struct Unverified(String);
 /// Whether somebody asked for an end. Nothing until [`watch_interrupts`].
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From here on Ctrl-C and the like are for [`check_interrupt`] to see; before, they end the program. What whoever
-/// started it ignores, as `nohup` does the end of a terminal, stays ignored.
+/// From here on Ctrl-C and the like are for [`check_interrupt`] to see; before, they end the program. The end of its
+/// terminal stays ignored where whoever started it ignores that, as `nohup` does. (Shells ignore SIGINT for whatever
+/// scripts start with `&`, and mean nothing by it.)
 fn watch_interrupts() {
     let flag = INTERRUPTED.get_or_init(Arc::default);
-    let ignored = ignored_signals();
-    for &signal in SIGNALS.iter().filter(|&&signal| ignored >> (signal - 1) & 1 == 0) {
+    let register = |signal| {
         signal_hook::flag::register(signal, flag.clone()).expect("it is a signal that can be handled");
+    };
+    register(signal_hook::consts::SIGINT);
+    register(signal_hook::consts::SIGTERM);
+    #[cfg(unix)]
+    if !is_ignored(signal_hook::consts::SIGHUP) {
+        register(signal_hook::consts::SIGHUP);
     }
 }
 
+/// Whether a signal is ignored, as far as Linux tells.
 #[cfg(unix)]
-const SIGNALS: [i32; 3] =
-    [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP];
-#[cfg(not(unix))]
-const SIGNALS: [i32; 2] = [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM];
-
-/// The signals that are ignored, signal n as bit n - 1; none where that cannot be told.
-fn ignored_signals() -> u64 {
+fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> (signal - 1) & 1 == 1
 }
 
 /// An error once Ctrl-C was pressed: long work asks from time to time.
