@@ -8,8 +8,8 @@ use serde::Serialize;
 use spectroll::output::{Field, Format, Schema};
 use spectroll::{Engine, Recipe, Stream};
 
-use super::grouped;
 use super::sink::{OutputArguments, Target};
+use super::{folder, grouped};
 
 /// How long the drawing is tried.
 const TRIAL: Duration = Duration::from_millis(300);
@@ -107,7 +107,7 @@ impl DryRun {
         let (rate, seconds) = (self.draws_per_second / 1e6, self.draws as f64 / self.draws_per_second);
         writeln!(out, "  {seconds:.1} s of drawing at {rate:.1} million a second, besides the writing")?;
         if self.target != Target::Stdout {
-            writeln!(out, "  {}", room(Path::new(&self.output), self.bytes))?;
+            writeln!(out, "  {}", room(Path::new(&self.output), self.bytes, self.free))?;
         }
         Ok(())
     }
@@ -129,18 +129,14 @@ fn rate(recipe: &Recipe, engine: &Engine) -> anyhow::Result<f64> {
 }
 
 /// Free bytes in the folder of a path, if there is such a folder.
-fn free(path: &Path) -> Option<u64> {
+pub(super) fn free(path: &Path) -> Option<u64> {
     fs4::available_space(folder(path)).ok()
 }
 
-fn folder(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Whether the disk has room.
-pub(super) fn room(path: &Path, bytes: u64) -> String {
+/// Whether the disk has room, with so much of it free.
+pub(super) fn room(path: &Path, bytes: u64, free: Option<u64>) -> String {
     let folder = folder(path);
-    match free(path) {
+    match free {
         Some(free) => {
             let enough = if free > bytes { "enough" } else { "not enough" };
             format!("{} are free in {folder:?}, which is {enough}", size(free))

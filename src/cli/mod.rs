@@ -251,6 +251,11 @@ fn model(name: &str) -> anyhow::Result<Model> {
     Ok(Model::load(Path::new(name))?)
 }
 
+/// The folder that a path names something in.
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// What `--force` says of a file that exists.
 fn existing(force: bool) -> Existing {
     if force { Existing::Replace } else { Existing::Keep }

@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use spectroll::report::{Effort, Options, Report, ReportError, Verdict, figures, measure, page};
 use spectroll::{Choice, adapters};
 
-use super::{EngineArguments, Interrupted, Usage, check_interrupt, model, watch_interrupts};
+use super::{EngineArguments, Interrupted, Usage, check_interrupt, folder, model, watch_interrupts};
 
 /// Measure error against run time, accuracy, randomness and extreme cases, as a page with plots
 ///
@@ -139,7 +139,7 @@ const MARK: &str = "report.json";
 impl Folder {
     fn create(path: &Path, force: bool) -> anyhow::Result<Folder> {
         check(path, force)?;
-        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let parent = folder(path);
         let mut builder = tempfile::Builder::new();
         builder.prefix(".spectroll-").suffix(".partial");
         #[cfg(unix)] // as any new folder; by default only its owner could read it

@@ -168,13 +168,10 @@ impl Source for Rows<'_> {
     fn draw(&mut self, rows: Range<u64>, window: &mut Window) -> anyhow::Result<()> {
         let first = self.draws.first.wrapping_add(rows.start);
         let draws = Draws { first, count: rows.end - rows.start, ..self.draws };
-        let drawn = self.drawer.draw(draws, |batch| {
+        self.summary += self.drawer.draw(draws, |batch| {
             let columns = request::columns(self.recipe, &batch);
             window(&columns.iter().map(|column| &**column).collect::<Vec<_>>(), batch.draws.count)
         })?;
-        self.summary.draws += drawn.draws;
-        self.summary.attempts += drawn.attempts;
-        self.summary.above_one += drawn.above_one;
         Ok(())
     }
 }

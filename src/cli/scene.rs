@@ -12,7 +12,7 @@ use spectroll::output::{Outcome, Pending, Schema, SpdName};
 use spectroll::plot::Format;
 use spectroll::scene::{GroupSummary, Outline, PRESETS, Role, Scene};
 
-use super::dry_run::{room, size};
+use super::dry_run::{free, room, size};
 use super::picture_file;
 use super::preview::Preview;
 use super::run::Run;
@@ -324,7 +324,7 @@ impl Job<'_> {
         )?;
         let output = &self.arguments.output;
         if !output.to_stdout() && !output.output.as_os_str().is_empty() {
-            writeln!(out, "  {}", room(&output.output, outline.bytes))?;
+            writeln!(out, "  {}", room(&output.output, outline.bytes, free(&output.output)))?;
         }
         Ok(())
     }

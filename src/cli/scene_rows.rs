@@ -181,9 +181,7 @@ impl Source for Rows<'_> {
             window(&columns.iter().map(|column| &**column).collect::<Vec<_>>(), count)
         })?;
         for (all, part) in self.drawn.iter_mut().zip(drawn) {
-            all.summary.draws += part.summary.draws;
-            all.summary.attempts += part.summary.attempts;
-            all.summary.above_one += part.summary.above_one;
+            all.summary += part.summary;
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ mod gpu;
 
 use std::fmt;
 use std::num::NonZeroUsize;
+use std::ops::AddAssign;
 use std::time::{Duration, Instant};
 
 use half::f16;
@@ -202,6 +203,14 @@ impl Summary {
         self.draws += tallies.len() as u64;
         self.attempts += tallies.iter().map(|t| u64::from(t.attempts())).sum::<u64>();
         self.above_one += tallies.iter().filter(|t| t.above_one()).count() as u64;
+    }
+}
+
+impl AddAssign for Summary {
+    fn add_assign(&mut self, other: Summary) {
+        self.draws += other.draws;
+        self.attempts += other.attempts;
+        self.above_one += other.above_one;
     }
 }
 
