@@ -4,8 +4,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use spectroll::{
-    Bounds, Builtin, Choice, Dataset, Engine, EngineError, Extend, Fit, Grid, Kind, Model, Real, Recipe,
-    Stream, philox,
+    Bounds, BuiltinTable, Dataset, Engine, EngineChoice, EngineError, Extrapolation, Fit, Grid, Model, Real,
+    Recipe, SpectrumKind, Stream, philox,
 };
 
 fn words(c: &mut Criterion) {
@@ -24,13 +24,16 @@ fn words(c: &mut Criterion) {
 }
 
 fn fits(c: &mut Criterion) {
-    let tables = [Builtin::Munsell.table(), Builtin::Vrhel.table()];
-    let data = || Dataset::new(&tables, Grid::DEFAULT, Extend::Error).expect("the tables cover the grid");
+    let tables = [BuiltinTable::Munsell.table(), BuiltinTable::Vrhel.table()];
+    let data =
+        || Dataset::new(&tables, Grid::DEFAULT, Extrapolation::Error).expect("the tables cover the grid");
     let resampled = data();
     c.bench_function("resample 632 reflectances", |b| b.iter(|| black_box(data())));
-    c.bench_function("fit 632 reflectances", |b| b.iter(|| Fit::new(Kind::Reflectance).fit(&resampled)));
+    c.bench_function("fit 632 reflectances", |b| {
+        b.iter(|| Fit::new(SpectrumKind::Reflectance).fit(&resampled))
+    });
     let model = Model::builtin("munsell-vrhel").expect("it is built in");
-    c.bench_function("build a recipe", |b| b.iter(|| Recipe::new(&model).lrv(0.4).build()));
+    c.bench_function("build a recipe", |b| b.iter(|| Recipe::builder(&model).lrv(0.4).build()));
 }
 
 fn draws(c: &mut Criterion) {
@@ -40,19 +43,19 @@ fn draws(c: &mut Criterion) {
     let surface = Model::builtin("munsell-vrhel").expect("it is built in");
     let light = Model::builtin("granada").expect("it is built in");
     let recipes = [
-        ("reflectances", Recipe::new(&surface)),
-        ("reflectances of LRV 0.4, scaled", Recipe::new(&surface).lrv(0.4).bounds(Bounds::Scaled)),
-        ("illuminants", Recipe::new(&light)),
+        ("reflectances", Recipe::builder(&surface)),
+        ("reflectances of LRV 0.4, scaled", Recipe::builder(&surface).lrv(0.4).bounds(Bounds::Scaled)),
+        ("illuminants", Recipe::builder(&light)),
     ];
-    let engines = [("cpu", Engine::new(&Choice::Cpu)), ("gpu", Engine::new(&Choice::Gpu))];
+    let engines = [("cpu", Engine::new(&EngineChoice::Cpu)), ("gpu", Engine::new(&EngineChoice::Gpu))];
     for (name, recipe) in recipes {
         let recipe = recipe.build().expect("it can be drawn");
         for (engine_name, engine) in &engines {
             let Ok(engine) = engine else { continue };
             let draws = Stream::new(1).draws(0..COUNT);
-            let mut drawer = engine.drawer(&recipe).expect("the engine works");
+            let mut session = engine.session(&recipe).expect("the engine works");
             group.bench_function(format!("{name}, {engine_name}"), |b| {
-                b.iter(|| drawer.draw::<EngineError>(draws, |_| Ok(())))
+                b.iter(|| session.draw::<EngineError>(draws, |_| Ok(())))
             });
         }
     }

@@ -18,11 +18,11 @@ pub(crate) const CELL: u32 = 30;
 
 pub(crate) fn surfaces() -> Result<Recipe, Box<dyn std::error::Error>> {
     let model = Model::builtin("munsell-vrhel")?;
-    Ok(Recipe::new(&model).quantities([Quantity::Spectra]).layout(Layout::PaddedRows).build()?)
+    Ok(Recipe::builder(&model).quantities([Quantity::Spectra]).layout(Layout::PaddedRows).build()?)
 }
 
 pub(crate) fn daylights() -> Result<Recipe, Box<dyn std::error::Error>> {
-    Ok(Recipe::new(&Model::builtin("granada")?).build()?)
+    Ok(Recipe::builder(&Model::builtin("granada")?).build()?)
 }
 
 pub(crate) fn picture() -> Result<host::Image, Box<dyn std::error::Error>> {

@@ -15,8 +15,8 @@ pub(crate) const CELL: u32 = 30;
 
 pub(crate) fn chips() -> Result<Recipe, Box<dyn std::error::Error>> {
     let model = Model::builtin("munsell-vrhel")?;
-    let wanted = [Quantity::Srgb, Quantity::Xyz];
-    Ok(Recipe::new(&model).lrv(0.3).bounds(Bounds::Scaled).quantities(wanted).build()?)
+    let wanted = [Quantity::LinearSrgb, Quantity::Xyz];
+    Ok(Recipe::builder(&model).lrv(0.3).bounds(Bounds::Scaled).quantities(wanted).build()?)
 }
 
 pub(crate) fn picture() -> Result<host::Image, Box<dyn std::error::Error>> {

@@ -8,7 +8,7 @@ use spectroll::{Model, Recipe, Stream};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = Model::builtin("munsell-vrhel")?;
-    let reflectances = Recipe::new(&model).build()?.scalar::<f32>();
+    let reflectances = Recipe::builder(&model).build()?.scalar_sampler::<f32>();
     // One of ours, which starts anywhere at no cost; any other of `rand`'s will do.
     let generator = Stream::named(1, "example").rng();
     let drawn: Vec<_> = reflectances.sample_iter(generator).take(10_000).collect();

@@ -4,7 +4,9 @@
 //!
 //!     cargo run --release --example scene -- walls.png
 
-use spectroll::scene::{Aim, Illuminants, Levels, Scene, SceneError, SceneSampler, Surfaces, Targets};
+use spectroll::scene::{
+    Illuminants, LrvLevels, Scene, SceneError, SceneSampler, Surfaces, TargetConstraint, Targets,
+};
 use spectroll::wgpu::{self, util::DeviceExt};
 use spectroll::{Bounds, Model, colorimetry};
 
@@ -20,8 +22,8 @@ pub(crate) const TILE: u32 = 12;
 pub(crate) fn walls() -> Result<Scene, SceneError> {
     let surfaces = Model::builtin("munsell-vrhel").expect("it is built in");
     let daylight = Model::builtin("granada").expect("it is built in");
-    let levels = Aim::Lrv(Levels::even(0.2, 0.6, SCENES));
-    Scene::new(u64::from(SCENES))
+    let levels = TargetConstraint::Lrv(LrvLevels::even(0.2, 0.6, SCENES));
+    Scene::builder(u64::from(SCENES))
         .group(Illuminants::new("lamp", &daylight, 1))
         .group(Surfaces::new("wall", &surfaces, u64::from(TILES * TILES)))
         .group(Targets::new("target", &surfaces, levels).bounds(Bounds::Scaled))

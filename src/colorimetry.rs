@@ -3,17 +3,17 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::dataset::Builtin;
-use crate::grid::{Extend, Grid, Spline};
+use crate::dataset::BuiltinTable;
+use crate::grid::{Extrapolation, Grid, Spline};
 
 /// The CIE standard illuminant D65 on a grid (relative power, 100 at 560 nm); zero outside 380 to 780 nm.
 pub fn d65(grid: Grid) -> Vec<f64> {
-    on_grid(Builtin::D65, 0, grid)
+    on_grid(BuiltinTable::D65, 0, grid)
 }
 
 /// The CIE 1931 colour matching functions x, y and z on a grid; zero outside 360 to 830 nm.
 pub fn cmf(grid: Grid) -> [Vec<f64>; 3] {
-    [0, 1, 2].map(|function| on_grid(Builtin::Xyz1931, function, grid))
+    [0, 1, 2].map(|function| on_grid(BuiltinTable::Xyz1931, function, grid))
 }
 
 /// The CIE standard illuminant A on a grid (relative power, 100 at 560 nm): a black body of 2848 K in the temperature
@@ -23,10 +23,10 @@ pub fn illuminant_a(grid: Grid) -> Vec<f64> {
     grid.wavelengths().map(|w| 100.0 * planck(w) / planck(560.0)).collect()
 }
 
-fn on_grid(table: Builtin, spectrum: usize, grid: Grid) -> Vec<f64> {
+fn on_grid(table: BuiltinTable, spectrum: usize, grid: Grid) -> Vec<f64> {
     let table = table.table();
     let spline = Spline::new(table.wavelengths(), table.spectrum(spectrum));
-    grid.wavelengths().map(|w| spline.at(w, Extend::Zero)).collect()
+    grid.wavelengths().map(|w| spline.at(w, Extrapolation::Zero)).collect()
 }
 
 /// The weights of X, Y and Z for reflectances under D65: tristimulus values are their products with a reflectance,

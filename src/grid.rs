@@ -2,7 +2,7 @@
 //!
 //! Models live on uniform grids; measurements need not. Where a grid point is a measured point its value is taken as
 //! it stands; elsewhere a not-a-knot cubic spline interpolates, as the field's MATLAB tools do. Nothing is
-//! extrapolated unless [`Extend`] says how.
+//! extrapolated unless [`Extrapolation`] says how.
 
 use std::fmt;
 use std::str::FromStr;
@@ -169,7 +169,7 @@ pub(crate) fn check_increasing(wavelengths: &[f64]) -> Result<(), GridError> {
 
 /// What a spectrum is outside the wavelengths at which it was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Extend {
+pub enum Extrapolation {
     /// Unknown: asking for it is an error.
     #[default]
     Error,
@@ -193,7 +193,7 @@ impl<'a> Spline<'a> {
     }
 
     /// The value at `at`; outside the measured range as `extend` says, where `Error` holds the end value.
-    pub(crate) fn at(&self, at: f64, extend: Extend) -> f64 {
+    pub(crate) fn at(&self, at: f64, extend: Extrapolation) -> f64 {
         let last = self.x.len() - 1;
         let right = self.x.partition_point(|&x| x <= at);
         if right > 0 && self.x[right - 1] == at {
@@ -201,8 +201,8 @@ impl<'a> Spline<'a> {
         }
         if right == 0 || right > last {
             return match extend {
-                Extend::Zero => 0.0,
-                Extend::Hold | Extend::Error => self.y[if right == 0 { 0 } else { last }],
+                Extrapolation::Zero => 0.0,
+                Extrapolation::Hold | Extrapolation::Error => self.y[if right == 0 { 0 } else { last }],
             };
         }
         let left = right - 1;
@@ -302,9 +302,9 @@ mod tests {
         let spline = Spline::new(&x, &y);
         for i in 0..=320 {
             let at = 1.0 + i as f64 * 0.01;
-            assert!((spline.at(at, Extend::Error) - cubic(at)).abs() < 1e-12, "at {at}");
+            assert!((spline.at(at, Extrapolation::Error) - cubic(at)).abs() < 1e-12, "at {at}");
         }
-        assert!(x.iter().zip(&y).all(|(&x, &y)| spline.at(x, Extend::Error) == y));
+        assert!(x.iter().zip(&y).all(|(&x, &y)| spline.at(x, Extrapolation::Error) == y));
     }
 
     /// scipy.interpolate.CubicSpline(x, y, bc_type="not-a-knot") at 1.5, 2.5 and 3.5, through the first 6, 4 and 3
@@ -316,11 +316,11 @@ mod tests {
         for (n, expected) in SCIPY {
             let spline = Spline::new(&x[..n], &y[..n]);
             for (at, value) in [1.5, 2.5, 3.5].into_iter().zip(expected) {
-                assert!((spline.at(at, Extend::Hold) - value).abs() < 1e-13, "{n} points at {at}");
+                assert!((spline.at(at, Extrapolation::Hold) - value).abs() < 1e-13, "{n} points at {at}");
             }
         }
         let spline = Spline::new(&x, &y);
-        assert_eq!((spline.at(0.5, Extend::Zero), spline.at(9.0, Extend::Hold)), (0.0, 3.0));
+        assert_eq!((spline.at(0.5, Extrapolation::Zero), spline.at(9.0, Extrapolation::Hold)), (0.0, 3.0));
     }
 
     const SCIPY: [(usize, [f64; 3]); 3] = [

@@ -1,74 +1,58 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-// In the order in which the data passes through them.
+// In the order in which the data pass through them: a room imports only from those above it.
 mod grid;
 
 mod dataset;
 
 pub mod colorimetry;
 
-mod fit;
-mod model;
-
-mod condition;
-mod program;
+mod affine;
+mod draw_status;
 mod quantity;
-mod region;
 
-mod level;
-mod normal;
-mod philox;
-mod real;
-mod stream;
-mod truncated;
+mod random;
+
+mod model;
 
 mod cover;
 
-mod cpu;
-mod outputs;
-mod recipe;
+mod program;
 
+mod cpu;
 mod wgsl;
+
+mod recipe;
 
 mod sampler;
 
 mod engine;
-#[cfg(test)]
-mod probe;
-
-pub mod output;
-pub mod provenance;
-
-#[cfg(feature = "report")]
-pub mod costs;
-#[cfg(feature = "report")]
-#[doc(hidden)]
-pub mod plot;
-#[cfg(feature = "report")]
-pub mod statistics;
-#[cfg(feature = "report")]
-pub mod stress;
-
-#[cfg(feature = "report")]
-pub mod report;
 
 pub mod scene;
 
-pub use dataset::{Builtin, Dataset, DatasetError, Kind, Table};
-pub use engine::{Adapter, Batch, Choice, Drawer, Engine, EngineError, Summary, adapters};
-pub use fit::{Fit, FitError};
-pub use grid::{Extend, Grid, GridError};
-pub use model::{MAX_COMPONENTS, Model, ModelError, Normalization, Parts};
-pub use philox::philox;
-pub use program::{Bounds, Tally};
-pub use quantity::{Element, Format, Interval, Layout, Quantity};
-pub use real::Real;
+pub mod output;
+
+pub mod export;
+
+#[cfg(feature = "report")]
+#[doc(hidden)]
+pub mod evaluation;
+
+pub use dataset::{BuiltinTable, Dataset, DatasetError, SpectrumKind, Table};
+pub use draw_status::DrawStatus;
+pub use engine::{Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, adapters};
+pub use grid::{Extrapolation, Grid, GridError};
+pub use model::{Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};
+pub use program::Bounds;
+pub use quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
+pub use random::philox::philox;
+pub use random::real::Real;
+pub use random::stream::{DrawRange, Stream, StreamRng};
 pub use recipe::{
-    DEFAULT_MAX_ATTEMPTS, Drawn, Intensity, Luminance, Proposal, Recipe, RecipeBuilder, RecipeError,
-    ScalarDrawer,
+    DEFAULT_MAX_ATTEMPTS, Draw, Intensity, ProposalKind, Recipe, RecipeBuilder, RecipeError, ScalarSampler,
+    XyzScale,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
-pub use stream::{Draws, Stream, StreamRng};
 pub use wgpu;
-pub use wgsl::TextError;
+pub use wgsl::WgslError;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Something that a draw can give. Each is an array of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum Quantity {
     /// The spectrum: a value for each band, after scaling where there is a target or an intensity.
     Spectra,
@@ -16,10 +16,10 @@ pub enum Quantity {
     /// illuminant its own.
     Xyz,
     /// The same as linear Rec. 709 components, 3 (IEC 61966-2-1), unclamped.
-    Srgb,
+    LinearSrgb,
     /// The luminous reflectance value of a reflectance under D65; the target where there is one.
     Lrv,
-    /// A [`Tally`](crate::Tally): how many candidates the draw took.
+    /// A [`DrawStatus`](crate::DrawStatus): how many candidates the draw took.
     Attempts,
     /// What an illuminant was multiplied by.
     Intensity,
@@ -31,7 +31,7 @@ impl Quantity {
         Quantity::Spectra,
         Quantity::Weights,
         Quantity::Xyz,
-        Quantity::Srgb,
+        Quantity::LinearSrgb,
         Quantity::Lrv,
         Quantity::Attempts,
         Quantity::Intensity,
@@ -43,7 +43,7 @@ impl Quantity {
             Quantity::Spectra => "spectra",
             Quantity::Weights => "weights",
             Quantity::Xyz => "xyz",
-            Quantity::Srgb => "srgb",
+            Quantity::LinearSrgb => "linear_srgb",
             Quantity::Lrv => "lrv",
             Quantity::Attempts => "attempts",
             Quantity::Intensity => "intensity",
@@ -74,26 +74,26 @@ pub enum Layout {
 /// none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Interval {
+pub enum ValueRange {
     /// Above 0.
     Positive,
     /// Above 0 and below 1.
     Unit,
 }
 
-impl Interval {
+impl ValueRange {
     /// The least half-precision number in it, and the largest; infinity where there is none.
     pub(crate) fn halves(self) -> [f32; 2] {
         match self {
-            Interval::Positive => [2f32.powi(-24), f32::INFINITY],
-            Interval::Unit => [2f32.powi(-24), 1.0 - 2f32.powi(-11)],
+            ValueRange::Positive => [2f32.powi(-24), f32::INFINITY],
+            ValueRange::Unit => [2f32.powi(-24), 1.0 - 2f32.powi(-11)],
         }
     }
 }
 
 /// The type of a value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Element {
+pub enum Dtype {
     /// IEEE half precision: 11 significant bits, nothing above 65,504. Two make a word of a shader, the first its low
     /// half.
     #[serde(rename = "float16")]
@@ -110,49 +110,49 @@ pub enum Element {
     U32,
 }
 
-impl Element {
+impl Dtype {
     /// Its size in bytes.
     pub fn size(self) -> usize {
         match self {
-            Element::F16 => 2,
-            Element::F32 | Element::U32 => 4,
-            Element::F64 => 8,
+            Dtype::F16 => 2,
+            Dtype::F32 | Dtype::U32 => 4,
+            Dtype::F64 => 8,
         }
     }
 
     /// What NumPy, Zarr and xarray call it.
     pub fn name(self) -> &'static str {
         match self {
-            Element::F16 => "float16",
-            Element::F32 => "float32",
-            Element::F64 => "float64",
-            Element::U32 => "uint32",
+            Dtype::F16 => "float16",
+            Dtype::F32 => "float32",
+            Dtype::F64 => "float64",
+            Dtype::U32 => "uint32",
         }
     }
 }
 
 /// How a quantity lies in its array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Format {
+pub struct ArrayFormat {
     /// What it is.
     pub quantity: Quantity,
     /// The type of its values.
-    pub element: Element,
+    pub dtype: Dtype,
     /// How many a draw has, without padding.
     pub width: usize,
     /// How they are ordered.
     pub layout: Layout,
 }
 
-impl Format {
+impl ArrayFormat {
     /// That of spectra unless asked otherwise.
-    pub(crate) fn spectra(bands: usize) -> Format {
-        Format { quantity: Quantity::Spectra, element: Element::F32, width: bands, layout: Layout::Rows }
+    pub(crate) fn spectra(bands: usize) -> ArrayFormat {
+        ArrayFormat { quantity: Quantity::Spectra, dtype: Dtype::F32, width: bands, layout: Layout::Rows }
     }
 
     /// That of tallies.
-    pub(crate) fn tally() -> Format {
-        Format { quantity: Quantity::Attempts, element: Element::U32, width: 1, layout: Layout::Rows }
+    pub(crate) fn status() -> ArrayFormat {
+        ArrayFormat { quantity: Quantity::Attempts, dtype: Dtype::U32, width: 1, layout: Layout::Rows }
     }
 
     /// How many values there are from the start of one row to the start of the next. 1 in planes.
@@ -179,7 +179,7 @@ impl Format {
 
     /// How many bytes the array of `draws` draws has.
     pub fn bytes(&self, draws: u64) -> u64 {
-        self.values(draws) * self.element.size() as u64
+        self.values(draws) * self.dtype.size() as u64
     }
 }
 
@@ -189,9 +189,10 @@ mod tests {
 
     #[test]
     fn sizes() {
-        let format = |layout, element| Format { quantity: Quantity::Spectra, element, width: 31, layout };
-        assert_eq!(format(Layout::Rows, Element::F32).bytes(5), 4 * 31 * 5);
-        assert_eq!(format(Layout::PaddedRows, Element::F32).bytes(5), 4 * 32 * 5);
-        assert_eq!(format(Layout::Planes, Element::F16).bytes(5), 2 * 31 * 8);
+        let format =
+            |layout, element| ArrayFormat { quantity: Quantity::Spectra, element, width: 31, layout };
+        assert_eq!(format(Layout::Rows, Dtype::F32).bytes(5), 4 * 31 * 5);
+        assert_eq!(format(Layout::PaddedRows, Dtype::F32).bytes(5), 4 * 32 * 5);
+        assert_eq!(format(Layout::Planes, Dtype::F16).bytes(5), 2 * 31 * 8);
     }
 }

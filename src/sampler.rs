@@ -5,10 +5,10 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::{BufferUsages, Device};
 
 use crate::program::Program;
-use crate::quantity::{Format, Quantity};
+use crate::quantity::{ArrayFormat, Quantity};
+use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
-use crate::stream::Draws;
-use crate::wgsl::{self, COVER_AT, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Tables, Target};
+use crate::wgsl::{self, COVER_AT, Dialect, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Tables};
 
 /// A recipe's compute pipeline on a wgpu device, to be recorded into its host's command encoders.
 ///
@@ -21,7 +21,7 @@ use crate::wgsl::{self, COVER_AT, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Tables, 
 ///
 /// # fn host() -> Option<(wgpu::Device, wgpu::Queue)> { None }
 /// # let Some((device, queue)) = host() else { return Ok(()) };
-/// let recipe = Recipe::new(&Model::builtin("munsell-vrhel")?).quantities([Quantity::Xyz]).build()?;
+/// let recipe = Recipe::builder(&Model::builtin("munsell-vrhel")?).quantities([Quantity::Xyz]).build()?;
 /// let sampler = Sampler::new(&device, &recipe)?;
 /// let draws = sampler.prepare(&device, Stream::new(1).draws(0..4096))?;
 ///
@@ -38,7 +38,7 @@ pub struct Sampler {
     /// The boxes that candidates are proposed from, where they are.
     cover: Option<wgpu::Buffer>,
     /// What comes out.
-    formats: Vec<Format>,
+    formats: Vec<ArrayFormat>,
     max_attempts: u32,
     draws_per_thread: u32,
 }
@@ -94,7 +94,7 @@ impl Sampler {
     pub(crate) fn with_text(
         device: &Device,
         program: &Program,
-        target: Target,
+        target: Dialect,
         text: String,
         tables: &Tables,
     ) -> Result<Sampler, SamplerError> {
@@ -135,17 +135,17 @@ impl Sampler {
     }
 
     /// The form of shader that suits a device.
-    pub(crate) fn target(device: &Device) -> Target {
+    pub(crate) fn target(device: &Device) -> Dialect {
         let int64 = device.features().contains(wgpu::Features::SHADER_INT64);
         match (int64, device.adapter_info().device_type) {
-            (false, _) => Target::Baseline,
-            (true, wgpu::DeviceType::Cpu) => Target::SoftwareInt64,
-            (true, _) => Target::Int64,
+            (false, _) => Dialect::Baseline,
+            (true, wgpu::DeviceType::Cpu) => Dialect::SoftwareInt64,
+            (true, _) => Dialect::Int64,
         }
     }
 
     /// What comes out, in the order of [`Quantity`], and how it lies in its buffer.
-    pub fn formats(&self) -> &[Format] {
+    pub fn formats(&self) -> &[ArrayFormat] {
         &self.formats
     }
 
@@ -172,7 +172,7 @@ impl Sampler {
     }
 
     /// Buffers for `draws`, and all that records them.
-    pub fn prepare(&self, device: &Device, draws: Draws) -> Result<Prepared, SamplerError> {
+    pub fn prepare(&self, device: &Device, draws: DrawRange) -> Result<Prepared, SamplerError> {
         self.prepare_for(device, draws, BufferUsages::COPY_SRC)
     }
 
@@ -180,7 +180,7 @@ impl Sampler {
     pub(crate) fn prepare_for(
         &self,
         device: &Device,
-        draws: Draws,
+        draws: DrawRange,
         usage: BufferUsages,
     ) -> Result<Prepared, SamplerError> {
         let (largest, limit) = self.limit(&device.limits());
@@ -188,7 +188,7 @@ impl Sampler {
             return Err(SamplerError::TooMany { count: draws.count, largest, limit });
         }
         let capacity = draws.count.max(1).next_multiple_of(u64::from(self.draws_per_thread));
-        let output = |format: &Format| {
+        let output = |format: &ArrayFormat| {
             let label = format!("spectroll {}", format.quantity);
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(&label),
@@ -204,7 +204,7 @@ impl Sampler {
             BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             bytemuck::bytes_of(&self.parameters(draws)),
         );
-        let at = |format: &Format| OUTPUTS_AT + format.quantity as u32;
+        let at = |format: &ArrayFormat| OUTPUTS_AT + format.quantity as u32;
         let entries: Vec<_> = std::iter::once((PARAMETERS_AT, &parameters))
             .chain(self.tables.iter().map(|tables| (TABLES_AT, tables)))
             .chain(self.cover.iter().map(|cover| (COVER_AT, cover)))
@@ -220,7 +220,7 @@ impl Sampler {
         Ok(Prepared { sampler: self.clone(), bindings, parameters, outputs, count, prepared })
     }
 
-    fn parameters(&self, draws: Draws) -> Parameters {
+    fn parameters(&self, draws: DrawRange) -> Parameters {
         Parameters {
             key: draws.stream.key(),
             first: draws.stream.index_words(draws.first),
@@ -266,7 +266,7 @@ impl Prepared {
     }
 
     /// What comes out, and how it lies in the buffers. Planes are `count` draws apart, rounded up to a multiple of 4.
-    pub fn formats(&self) -> &[Format] {
+    pub fn formats(&self) -> &[ArrayFormat] {
         &self.sampler.formats
     }
 
@@ -284,7 +284,7 @@ impl Prepared {
     ///
     /// # fn host() -> Option<(wgpu::Device, wgpu::Queue)> { None }
     /// # let Some((device, queue)) = host() else { return Ok(()) };
-    /// let recipe = Recipe::new(&Model::builtin("granada")?).build()?;
+    /// let recipe = Recipe::builder(&Model::builtin("granada")?).build()?;
     /// let mut lamps = Sampler::new(&device, &recipe)?.prepare(&device, Stream::new(0).draws(0..64))?;
     /// for frame in 0..3 {
     ///     lamps.set_draws(&queue, Stream::new(frame).draws(0..64))?;
@@ -294,7 +294,7 @@ impl Prepared {
     /// }
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn set_draws(&mut self, queue: &wgpu::Queue, draws: Draws) -> Result<(), SamplerError> {
+    pub fn set_draws(&mut self, queue: &wgpu::Queue, draws: DrawRange) -> Result<(), SamplerError> {
         if draws.count > self.prepared {
             return Err(SamplerError::NoRoom { count: draws.count, prepared: self.prepared });
         }

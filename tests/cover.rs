@@ -1,30 +1,30 @@
 //! Draws of what plain rejection cannot reach: near-white reflectances and strong covariances, from a cover.
 
 use spectroll::{
-    Bounds, Choice, Draws, Engine, EngineError, Model, Proposal, Quantity, Recipe, RecipeBuilder,
-    RecipeError, Stream, Tally, colorimetry,
+    Bounds, DrawRange, DrawStatus, Engine, EngineChoice, EngineError, Model, ProposalKind, Quantity, Recipe,
+    RecipeBuilder, RecipeError, Stream, colorimetry,
 };
 
 /// Draws of each recipe.
 const COUNT: u64 = 20_003;
 
 fn surfaces() -> RecipeBuilder {
-    Recipe::new(&Model::builtin("munsell-vrhel").expect("it is built in"))
+    Recipe::builder(&Model::builtin("munsell-vrhel").expect("it is built in"))
 }
 
 fn near_white(lrv: f64) -> RecipeBuilder {
     surfaces().lrv(lrv).bounds(Bounds::Scaled)
 }
 
-fn rows(engine: &Engine, recipe: &Recipe, draws: Draws) -> (Vec<f32>, Vec<Tally>) {
-    let (mut spectra, mut tallies) = (Vec::new(), Vec::new());
+fn rows(engine: &Engine, recipe: &Recipe, draws: DrawRange) -> (Vec<f32>, Vec<DrawStatus>) {
+    let (mut spectra, mut statuses) = (Vec::new(), Vec::new());
     let made = engine.draw(recipe, draws, |batch| {
         spectra.extend_from_slice(batch.spectra());
-        tallies.extend_from_slice(batch.tallies());
+        statuses.extend_from_slice(batch.statuses());
         Ok::<_, EngineError>(())
     });
     made.unwrap_or_else(|e| panic!("{engine}: {e}"));
-    (spectra, tallies)
+    (spectra, statuses)
 }
 
 /// Target LRVs and covariance scales, with the probability of a candidate (plain rejection where it reaches that far,
@@ -44,12 +44,13 @@ fn extremes() -> Vec<(String, Recipe, f64)> {
 
 #[test]
 fn extremes_are_covered_and_physical_and_the_same_on_every_engine() {
-    let (cpu, gpu) = (Engine::new(&Choice::Cpu).expect("it is always there"), Engine::new(&Choice::Gpu));
+    let (cpu, gpu) =
+        (Engine::new(&EngineChoice::Cpu).expect("it is always there"), Engine::new(&EngineChoice::Gpu));
     let gpu = gpu.unwrap_or_else(|e| panic!("this needs an adapter: {e}"));
     let software = gpu.adapter().is_some_and(|adapter| adapter.kind == "software");
     let weights = colorimetry::lrv_weights("400:10:700".parse().expect("a grid")).expect("it is visible");
     for (name, recipe, probability) in extremes() {
-        assert_eq!(recipe.proposal(), Proposal::Cover, "{name}");
+        assert_eq!(recipe.proposal(), ProposalKind::Cover, "{name}");
         // Six standard errors of 65,536 candidates, and the last digit of those known to three.
         let error = (recipe.probability() / probability - 1.0).abs();
         assert!(recipe.acceptance() > 0.1 && error < 0.06, "{name}: {} {error}", recipe.acceptance());
@@ -58,7 +59,7 @@ fn extremes_are_covered_and_physical_and_the_same_on_every_engine() {
         let (ours, theirs) = (rows(&cpu, &recipe, draws), rows(&gpu, &recipe, draws));
         assert!(!software || ours == theirs, "{name}");
         let mut attempts = 0;
-        for (i, (spectrum, tally)) in ours.0.chunks_exact(31).zip(&ours.1).enumerate() {
+        for (i, (spectrum, status)) in ours.0.chunks_exact(31).zip(&ours.1).enumerate() {
             assert!(spectrum.iter().all(|&s| s > 0.0 && s < 1.0), "{name}: draw {i}");
             if let Some(lrv) = name.strip_prefix("LRV ") {
                 let found: f64 = weights.iter().zip(spectrum).map(|(w, &s)| w * f64::from(s)).sum();
@@ -67,7 +68,7 @@ fn extremes_are_covered_and_physical_and_the_same_on_every_engine() {
                     "{name}: {found}"
                 );
             }
-            attempts += u64::from(tally.attempts());
+            attempts += u64::from(status.attempts());
         }
         let acceptance = COUNT as f64 / attempts as f64;
         assert!((acceptance / recipe.acceptance() - 1.0).abs() < 0.06, "{name}: {acceptance}");
@@ -80,10 +81,10 @@ fn f32_takes_the_candidates_of_f64() {
     let (mut flips, mut worst) = (0, 0f64);
     for (name, recipe, _) in extremes() {
         let stream = Stream::named(41, &name);
-        let (single, double) = (recipe.scalar::<f32>(), recipe.scalar::<f64>());
+        let (single, double) = (recipe.scalar_sampler::<f32>(), recipe.scalar_sampler::<f64>());
         for index in 0..5000 {
             let (ours, exact) = (single.draw(stream, index), double.draw(stream, index));
-            if ours.tally() != exact.tally() {
+            if ours.status() != exact.status() {
                 flips += 1;
                 continue;
             }
@@ -103,10 +104,10 @@ fn a_cover_draws_what_plain_rejection_draws() {
     let draws = |proposal, seed| {
         let recipe = surfaces().covariance_scale(25.0).proposal(proposal).build().expect("it can be drawn");
         assert_eq!(recipe.proposal(), proposal);
-        let engine = Engine::new(&Choice::Cpu).expect("it is always there");
+        let engine = Engine::new(&EngineChoice::Cpu).expect("it is always there");
         engine.collect(&recipe, Stream::new(seed).draws(0..COUNT)).expect("it draws")
     };
-    let samples = [draws(Proposal::Plain, 42), draws(Proposal::Cover, 43)];
+    let samples = [draws(ProposalKind::Plain, 42), draws(ProposalKind::Cover, 43)];
     for band in 0..31 {
         let [(a, va), (b, vb)] = samples.each_ref().map(|spectra| {
             let values: Vec<_> = spectra.iter().skip(band).step_by(31).map(|&s| f64::from(s)).collect();
@@ -148,7 +149,7 @@ fn what_cannot_be_covered_says_why() {
     assert!(refused.to_string().contains("the largest is 0.995928"), "{refused}");
     let [a, b] = [1.0, 1.2].map(|lrv| near_white(lrv).build().unwrap_err());
     assert!(matches!((a, b), (RecipeError::Lrv(_), RecipeError::Lrv(_))));
-    let hopeless = surfaces().covariance_scale(1e4).proposal(Proposal::Plain).build().unwrap_err();
+    let hopeless = surfaces().covariance_scale(1e4).proposal(ProposalKind::Plain).build().unwrap_err();
     assert!(matches!(hopeless, RecipeError::Hopeless { .. }), "{hopeless}");
     let module = near_white(0.99).build().expect("it can be drawn").wgsl("wall").unwrap_err();
     assert!(module.to_string().contains("needs a buffer"), "{module}");

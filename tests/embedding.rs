@@ -3,7 +3,8 @@
 #![allow(clippy::duplicate_mod)] // all examples have the host's boilerplate
 
 use spectroll::{
-    Choice, Engine, EngineError, Layout, Model, Quantity, Recipe, Sampler, SamplerError, Stream, colorimetry,
+    Engine, EngineChoice, EngineError, Layout, Model, Quantity, Recipe, Sampler, SamplerError, Stream,
+    colorimetry,
     wgpu::{self, BufferUsages},
 };
 
@@ -17,7 +18,10 @@ use embed::host;
 
 fn surfaces() -> Recipe {
     let model = Model::builtin("munsell-vrhel").expect("it is built in");
-    Recipe::new(&model).quantities([Quantity::Spectra, Quantity::Attempts]).build().expect("it can be drawn")
+    Recipe::builder(&model)
+        .quantities([Quantity::Spectra, Quantity::Attempts])
+        .build()
+        .expect("it can be drawn")
 }
 
 /// The words of buffers that a host has recorded something into.
@@ -76,7 +80,7 @@ fn a_host_draws_anew_in_each_frame() {
     let recipe = surfaces();
     let sampler = Sampler::new(&host.0, &recipe).expect("two buffers are few");
     let mut prepared = sampler.prepare(&host.0, Stream::new(1).draws(0..100)).expect("they are few");
-    let scalar = recipe.scalar::<f32>();
+    let scalar = recipe.scalar_sampler::<f32>();
     for (seed, count) in [(1, 100), (2, 37), (3, 100)] {
         let draws = Stream::new(seed).draws(5..5 + count);
         prepared.set_draws(&host.1, draws).expect("there is room");
@@ -107,7 +111,7 @@ fn what_does_not_fit_is_refused_with_the_limit() {
     assert!(error.to_string().contains(&format!("at most {largest} at once")), "{error}");
 
     let model = Model::builtin("munsell-vrhel").expect("it is built in");
-    let many = Recipe::new(&model)
+    let many = Recipe::builder(&model)
         .quantities(Quantity::ALL.into_iter().filter(|q| *q != Quantity::Intensity))
         .build()
         .expect("it can be drawn");
@@ -119,8 +123,9 @@ fn what_does_not_fit_is_refused_with_the_limit() {
 #[test]
 fn naga_oil_composes_a_module() {
     use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor};
-    let recipe =
-        Recipe::new(&Model::builtin("granada").expect("it is built in")).build().expect("it can be drawn");
+    let recipe = Recipe::builder(&Model::builtin("granada").expect("it is built in"))
+        .build()
+        .expect("it can be drawn");
     let module = format!("#define_import_path spectroll::sun\n{}", recipe.wgsl("sun").expect("it is small"));
     let mut composer = Composer::default();
     let added = composer.add_composable_module(ComposableModuleDescriptor {
@@ -203,7 +208,7 @@ fn chips_have_the_colours_of_the_cpu_and_one_luminance() {
     let chips = inline::chips().expect("it can be drawn");
     let half = inline::COLUMNS / 2;
     let colours: Vec<Vec<f64>> = (0..u64::from(inline::COLUMNS * inline::ROWS))
-        .map(|chip| chips.draw::<f64>(Stream::new(2), chip).values(Quantity::Srgb).to_vec())
+        .map(|chip| chips.draw::<f64>(Stream::new(2), chip).values(Quantity::LinearSrgb).to_vec())
         .collect();
     let (count, most) = differences(&image.pixels, image.width, |x, y| {
         let inside = |v: u32| (2..inline::CELL - 2).contains(&(v % inline::CELL));
@@ -227,10 +232,10 @@ fn walls_have_the_colours_of_the_cpu() {
     let walls = scene::walls().expect("it can be drawn");
     let observer = colorimetry::cmf(walls.grid());
     let bands = walls.grid().len();
-    let engine = Engine::new(&Choice::Cpu).expect("the CPU is always there");
+    let engine = Engine::new(&EngineChoice::Cpu).expect("the CPU is always there");
     let mut spectra: [Vec<f32>; 3] = Default::default();
-    let mut drawer = walls.drawer(&engine).expect("it can be drawn");
-    let drawn = drawer.draw(0..u64::from(scene::SCENES), |window| {
+    let mut session = walls.session(&engine).expect("it can be drawn");
+    let drawn = session.draw(0..u64::from(scene::SCENES), |window| {
         for (spectra, group) in spectra.iter_mut().zip(["lamp", "wall", "target"]) {
             spectra.extend_from_slice(window.values(group));
         }
@@ -275,7 +280,7 @@ fn walls_have_the_colours_of_the_cpu() {
 #[test]
 fn rows_are_padded_for_vec4() {
     let model = Model::builtin("munsell-vrhel").expect("it is built in");
-    let recipe = Recipe::new(&model).layout(Layout::PaddedRows).build().expect("it can be drawn");
+    let recipe = Recipe::builder(&model).layout(Layout::PaddedRows).build().expect("it can be drawn");
     let host = host::device();
     let sampler = Sampler::new(&host.0, &recipe).expect("one buffer is few");
     let prepared = sampler.prepare(&host.0, Stream::new(3).draws(0..10)).expect("they are few");

@@ -11,7 +11,9 @@ use std::process::Command;
 use nalgebra::DMatrix;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use spectroll::{Builtin, Dataset, Extend, Fit, FitError, Grid, Kind, Model, Normalization, Table};
+use spectroll::{
+    BuiltinTable, Dataset, Extrapolation, Fit, FitError, Grid, Model, Normalization, SpectrumKind, Table,
+};
 
 const GRIDS: [(&str, &str); 2] = [("", "400:10:700"), ("-5nm", "400:5:700")];
 
@@ -27,14 +29,14 @@ fn granada() -> Option<PathBuf> {
     Some(path)
 }
 
-fn fit(kind: Kind, tables: &[Table], grid: &str) -> Model {
+fn fit(kind: SpectrumKind, tables: &[Table], grid: &str) -> Model {
     let grid = grid.parse::<Grid>().expect("a grid");
-    let data = Dataset::new(tables, grid, Extend::Error).expect("the tables cover the grid");
+    let data = Dataset::new(tables, grid, Extrapolation::Error).expect("the tables cover the grid");
     Fit::new(kind).fit(&data).expect("the data have six components")
 }
 
 fn fit_granada(path: &Path, grid: &str) -> Model {
-    fit(Kind::Illuminant, &[Table::open(path, None).expect("a table")], grid)
+    fit(SpectrumKind::Illuminant, &[Table::open(path, None).expect("a table")], grid)
 }
 
 #[derive(Deserialize)]
@@ -74,8 +76,12 @@ fn fits_agree_with_numpy() {
     let granada = granada();
     let references = references(granada.as_deref());
     for (suffix, grid) in GRIDS {
-        let tables = [Builtin::Munsell.table(), Builtin::Vrhel.table()];
-        assert_agrees(&references, &format!("munsell-vrhel{suffix}"), &fit(Kind::Reflectance, &tables, grid));
+        let tables = [BuiltinTable::Munsell.table(), BuiltinTable::Vrhel.table()];
+        assert_agrees(
+            &references,
+            &format!("munsell-vrhel{suffix}"),
+            &fit(SpectrumKind::Reflectance, &tables, grid),
+        );
         if let Some(path) = &granada {
             assert_agrees(&references, &format!("granada{suffix}"), &fit_granada(path, grid));
         }
@@ -127,7 +133,7 @@ fn six_components_explain_nearly_all_variance() {
 fn dataset(spectra: &[Vec<f64>]) -> Dataset {
     let grid = Grid::new(400.0, 10.0, spectra[0].len()).expect("a grid");
     let table = Table::new("swatches", grid.wavelengths().collect(), spectra).expect("a table");
-    Dataset::new(&[table], grid, Extend::Error).expect("the table is on the grid")
+    Dataset::new(&[table], grid, Extrapolation::Error).expect("the table is on the grid")
 }
 
 #[test]
@@ -141,7 +147,7 @@ fn what_cannot_be_fitted_says_why() {
     let line = |a: f64| vec![0.5, 0.5 + a, 0.5 - a, 0.5];
     let plane =
         dataset(&[line(0.1), line(-0.2), line(0.3), vec![0.4, 0.5, 0.5, 0.4], vec![0.7, 0.5, 0.5, 0.7]]);
-    let reflectances = |k: usize| Fit::new(Kind::Reflectance).components(k);
+    let reflectances = |k: usize| Fit::new(SpectrumKind::Reflectance).components(k);
     assert_eq!(reflectances(2).fit(&plane).map(|m| m.components()), Ok(2));
     assert_eq!(reflectances(3).fit(&plane).unwrap_err(), FitError::Rank { components: 3, rank: 2 });
     assert!(reflectances(3).fit(&plane).unwrap_err().to_string().contains("rank 2"));
@@ -154,13 +160,13 @@ fn what_cannot_be_fitted_says_why() {
     assert_eq!(reflectances(1).fit(&alike).unwrap_err(), FitError::NoVariation { spectra: 4 });
 
     let dark = dataset(&[vec![1.0, 2.0], vec![1.0, -3.0], vec![2.0, 1.0]]);
-    let error = Fit::new(Kind::Illuminant).components(1).fit(&dark).unwrap_err();
+    let error = Fit::new(SpectrumKind::Illuminant).components(1).fit(&dark).unwrap_err();
     assert!(matches!(error, FitError::Power { power: -1.0, .. }), "{error:?}");
     assert!(
         error.to_string().starts_with("spectrum 2 of swatches (3 spectra): its mean power is -1"),
         "{error}"
     );
-    let unnormalized = Fit::new(Kind::Illuminant).components(1).normalization(Normalization::None);
+    let unnormalized = Fit::new(SpectrumKind::Illuminant).components(1).normalization(Normalization::None);
     assert!(unnormalized.fit(&dark).is_ok());
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use spectroll::{DatasetError, Kind, Table};
+use spectroll::{DatasetError, SpectrumKind, Table};
 
 const INT32: u32 = 5;
 const UINT32: u32 = 6;
@@ -104,7 +104,7 @@ fn both_byte_orders_plain_and_compressed() {
         let packed = [order.header(), compressed(order, &spectra), compressed(order, &sampling)].concat();
         for bytes in [plain, packed] {
             let table = open(&bytes, None).unwrap();
-            assert_eq!((table.len(), table.kind()), (2, Some(Kind::Reflectance)));
+            assert_eq!((table.len(), table.kind()), (2, Some(SpectrumKind::Reflectance)));
             assert_eq!(table.wavelengths(), [400.0, 410.0, 420.0]);
             assert_eq!((table.spectrum(0), table.spectrum(1)), (&SPECTRA[..3], &SPECTRA[3..]));
         }
@@ -118,7 +118,7 @@ fn structs_cells_and_objects_are_stepped_over() {
     let bytes =
         [order.header(), junk.concat(), order.doubles("spd_x", 3, &SPECTRA), order.sampling("S_x", GRID)];
     let table = open(&bytes.concat(), None).unwrap();
-    assert_eq!((table.len(), table.kind()), (2, Some(Kind::Illuminant)));
+    assert_eq!((table.len(), table.kind()), (2, Some(SpectrumKind::Illuminant)));
 }
 
 #[test]

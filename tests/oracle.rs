@@ -28,12 +28,16 @@ fn recipes() -> Vec<(&'static str, Recipe, f64)> {
         (name, builder.build().expect("the recipe can be drawn"), error)
     };
     vec![
-        recipe("reflectances", Recipe::new(&reflectances), ERROR),
-        recipe("covariance x 4", Recipe::new(&reflectances).covariance_scale(4.0), ERROR),
-        recipe("LRV 0.6, base", Recipe::new(&reflectances).lrv(0.6), SCALED_ERROR),
-        recipe("LRV 0.6, scaled", Recipe::new(&reflectances).lrv(0.6).bounds(Bounds::Scaled), SCALED_ERROR),
-        recipe("LRV 0.2, both", Recipe::new(&reflectances).lrv(0.2).bounds(Bounds::Both), SCALED_ERROR),
-        recipe("illuminants", Recipe::new(&daylights), ERROR),
+        recipe("reflectances", Recipe::builder(&reflectances), ERROR),
+        recipe("covariance x 4", Recipe::builder(&reflectances).covariance_scale(4.0), ERROR),
+        recipe("LRV 0.6, base", Recipe::builder(&reflectances).lrv(0.6), SCALED_ERROR),
+        recipe(
+            "LRV 0.6, scaled",
+            Recipe::builder(&reflectances).lrv(0.6).bounds(Bounds::Scaled),
+            SCALED_ERROR,
+        ),
+        recipe("LRV 0.2, both", Recipe::builder(&reflectances).lrv(0.2).bounds(Bounds::Both), SCALED_ERROR),
+        recipe("illuminants", Recipe::builder(&daylights), ERROR),
     ]
 }
 
@@ -47,7 +51,7 @@ enum Difference {
 
 fn difference(recipe: &Recipe, stream: Stream, index: u64) -> Difference {
     let (ours, exact) = (recipe.draw::<f32>(stream, index), recipe.draw::<f64>(stream, index));
-    if ours.tally().attempts() != exact.tally().attempts() {
+    if ours.status().attempts() != exact.status().attempts() {
         return Difference::Flip;
     }
     let (ours, exact) = (ours.spectrum(), exact.spectrum());

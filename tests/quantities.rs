@@ -4,8 +4,8 @@
 use std::sync::OnceLock;
 
 use spectroll::{
-    Bounds, Choice, Draws, Element, Engine, EngineError, Format, Intensity, Layout, Luminance, Model,
-    Quantity, Recipe, RecipeBuilder, Stream, colorimetry,
+    ArrayFormat, Bounds, DrawRange, Dtype, Engine, EngineChoice, EngineError, Intensity, Layout, Model,
+    Quantity, Recipe, RecipeBuilder, Stream, XyzScale, colorimetry,
 };
 
 /// Draws of each recipe: not a multiple of 4, so that planes have padding and pairs a half.
@@ -18,19 +18,21 @@ const BOUND: f64 = 2e-5;
 
 fn gpu() -> &'static Engine {
     static GPU: OnceLock<Engine> = OnceLock::new();
-    GPU.get_or_init(|| Engine::new(&Choice::Gpu).unwrap_or_else(|e| panic!("this needs an adapter: {e}")))
+    GPU.get_or_init(|| {
+        Engine::new(&EngineChoice::Gpu).unwrap_or_else(|e| panic!("this needs an adapter: {e}"))
+    })
 }
 
 fn cpu() -> Engine {
-    Engine::new(&Choice::Cpu).expect("the CPU is always there")
+    Engine::new(&EngineChoice::Cpu).expect("the CPU is always there")
 }
 
 fn surfaces() -> RecipeBuilder {
-    Recipe::new(&Model::builtin("munsell-vrhel").expect("it is built in"))
+    Recipe::builder(&Model::builtin("munsell-vrhel").expect("it is built in"))
 }
 
 fn lights() -> RecipeBuilder {
-    Recipe::new(&Model::builtin("granada").expect("it is built in"))
+    Recipe::builder(&Model::builtin("granada").expect("it is built in"))
 }
 
 fn all_but(quantity: Quantity) -> impl Iterator<Item = Quantity> {
@@ -44,7 +46,7 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
     let grid = Model::builtin("munsell-vrhel").expect("it is built in").grid();
     let recipes = [
         ("reflectances", reflected(surfaces())),
-        ("reflectances under A", reflected(surfaces()).light(&colorimetry::illuminant_a(grid))),
+        ("reflectances under A", reflected(surfaces()).illuminant(&colorimetry::illuminant_a(grid))),
         ("LRV 0.4", reflected(surfaces()).lrv(0.4)),
         ("LRV 0.6, scaled", reflected(surfaces()).lrv(0.6).bounds(Bounds::Scaled)),
         ("log-uniform lights", shining(lights()).intensity(Intensity::LogUniform(0.15, 150.0))),
@@ -52,15 +54,15 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
         ("lights of intensity 3", shining(lights()).intensity(Intensity::Fixed(3.0))),
         (
             "lights of Y = 1",
-            shining(lights()).intensity(Intensity::LogUniform(1e-6, 1e6)).luminance(Luminance::One),
+            shining(lights()).intensity(Intensity::LogUniform(1e-6, 1e6)).xyz_scale(XyzScale::UnitY),
         ),
     ];
     recipes.map(|(name, builder)| (name, builder.build().unwrap_or_else(|e| panic!("{name}: {e}")))).into()
 }
 
 /// The bytes of each quantity of each window, padding left out.
-fn values(engine: &Engine, recipe: &Recipe, draws: Draws) -> Vec<(Format, Vec<u32>)> {
-    let mut all: Vec<(Format, Vec<u32>)> = Vec::new();
+fn values(engine: &Engine, recipe: &Recipe, draws: DrawRange) -> Vec<(ArrayFormat, Vec<u32>)> {
+    let mut all: Vec<(ArrayFormat, Vec<u32>)> = Vec::new();
     let made = engine.draw(recipe, draws, |batch| {
         all.resize_with(batch.formats().len(), || (batch.formats()[0], Vec::new()));
         for (format, (slot, words)) in batch.formats().iter().zip(&mut all) {
@@ -73,7 +75,7 @@ fn values(engine: &Engine, recipe: &Recipe, draws: Draws) -> Vec<(Format, Vec<u3
                     _ => i * format.stride() + j,
                 };
                 words.push(match format.element {
-                    Element::F16 => u16::from_le_bytes([bytes[2 * at], bytes[2 * at + 1]]).into(),
+                    Dtype::F16 => u16::from_le_bytes([bytes[2 * at], bytes[2 * at + 1]]).into(),
                     _ => u32::from_le_bytes(bytes[4 * at..4 * at + 4].try_into().expect("there are 4")),
                 });
             }
@@ -152,11 +154,11 @@ fn what_is_filled_is_what_is_drawn() {
                 Ok::<_, EngineError>(())
             });
             let mut filled = vec![1.0; windows.len()];
-            let mut drawer = engine.drawer(&recipe).expect("the engine works");
+            let mut session = engine.session(&recipe).expect("the engine works");
             if layout == Layout::PaddedRows {
                 filled.fill(0.0); // the CPU leaves padding as it is
             }
-            assert_eq!(drawer.fill(draws, &mut filled), summary);
+            assert_eq!(session.fill(draws, &mut filled), summary);
             assert!(filled == windows, "{engine}");
         }
     }
@@ -165,15 +167,17 @@ fn what_is_filled_is_what_is_drawn() {
 /// A program in loops has the same quantities, too.
 #[test]
 fn programs_in_loops_have_the_same_values_on_every_engine() {
-    use spectroll::{Builtin, Dataset, Extend, Fit, Kind};
+    use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, SpectrumKind};
     let grid = "390:1:730".parse().expect("a grid");
-    let data = Dataset::new(&[Builtin::Vrhel.table()], grid, Extend::Error).expect("the table covers it");
-    let model = Fit::new(Kind::Reflectance).components(7).fit(&data).expect("the data have that rank");
+    let data = Dataset::new(&[BuiltinTable::Vrhel.table()], grid, Extrapolation::Error)
+        .expect("the table covers it");
+    let model =
+        Fit::new(SpectrumKind::Reflectance).components(7).fit(&data).expect("the data have that rank");
     let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
     for layout in [Layout::Rows, Layout::PaddedRows, Layout::Planes] {
         for half in [false, true] {
             let builder =
-                Recipe::new(&model).quantities(all_but(Quantity::Intensity)).lrv(0.4).layout(layout);
+                Recipe::builder(&model).quantities(all_but(Quantity::Intensity)).lrv(0.4).layout(layout);
             let builder = if half { builder.half_spectra() } else { builder };
             let recipe = builder.build().expect("it can be drawn");
             let draws = Stream::new(33).draws(0..1003);
@@ -199,10 +203,10 @@ fn values_are_those_of_f64() {
         };
         let (mut worst, mut of_white) = ([0f64; Quantity::ALL.len()], 0f64);
         let stream = Stream::named(34, name);
-        let (single, double) = (recipe.scalar::<f32>(), recipe.scalar::<f64>());
+        let (single, double) = (recipe.scalar_sampler::<f32>(), recipe.scalar_sampler::<f64>());
         for index in 0..COUNT {
             let (ours, exact) = (single.draw(stream, index), double.draw(stream, index));
-            if ours.tally() != exact.tally() {
+            if ours.status() != exact.status() {
                 continue; // flips are counted elsewhere
             }
             let dot = |w: &Vec<f64>| w.iter().zip(exact.spectrum()).map(|(w, s)| w * s).sum::<f64>();
@@ -215,12 +219,12 @@ fn values_are_those_of_f64() {
                 let quantity = format.quantity;
                 let expected = match quantity {
                     Quantity::Xyz => &xyz[..],
-                    Quantity::Srgb => &srgb[..],
+                    Quantity::LinearSrgb => &srgb[..],
                     _ => exact.values(quantity),
                 };
                 let peak = match quantity {
                     // Components of a saturated colour are small differences.
-                    Quantity::Srgb => xyz[1],
+                    Quantity::LinearSrgb => xyz[1],
                     Quantity::Weights => 1.0,
                     _ => expected.iter().fold(0.0, |a: f64, v| a.max(v.abs())),
                 };

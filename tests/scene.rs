@@ -6,11 +6,11 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use spectroll::scene::{
-    Aim, Copies, Hue, Illuminants, Levels, PRESETS, Scene, SceneBuilder, SceneSampler, Sharing, Surfaces,
-    Targets,
+    Copies, Hue, Illuminants, IntensityScope, LrvLevels, PRESETS, Scene, SceneBuilder, SceneSampler,
+    Surfaces, TargetConstraint, Targets,
 };
 use spectroll::{
-    Bounds, Choice, Engine, EngineError, Grid, Intensity, Model, Recipe, Stream, colorimetry, wgpu,
+    Bounds, Engine, EngineChoice, EngineError, Grid, Intensity, Model, Recipe, Stream, colorimetry, wgpu,
 };
 
 #[path = "../examples/host/mod.rs"]
@@ -19,12 +19,14 @@ mod host;
 
 fn gpu() -> &'static Engine {
     static GPU: OnceLock<Engine> = OnceLock::new();
-    GPU.get_or_init(|| Engine::new(&Choice::Gpu).unwrap_or_else(|e| panic!("this needs an adapter: {e}")))
+    GPU.get_or_init(|| {
+        Engine::new(&EngineChoice::Gpu).unwrap_or_else(|e| panic!("this needs an adapter: {e}"))
+    })
 }
 
 fn cpu() -> &'static Engine {
     static CPU: OnceLock<Engine> = OnceLock::new();
-    CPU.get_or_init(|| Engine::new(&Choice::Cpu).expect("the CPU is always there"))
+    CPU.get_or_init(|| Engine::new(&EngineChoice::Cpu).expect("the CPU is always there"))
 }
 
 fn daylight() -> Model {
@@ -41,11 +43,11 @@ fn preset(name: &str) -> Scene {
 
 /// The bytes of every array of some scenes, those that serve all scenes included.
 fn arrays(scene: &Scene, engine: &Engine, scenes: std::ops::Range<u64>) -> BTreeMap<String, Vec<u8>> {
-    let mut drawer = scene.drawer(engine).expect("it can be drawn");
-    let constants = drawer.constants().into_iter().map(|(array, bytes)| (array.name.clone(), bytes));
+    let mut session = scene.session(engine).expect("it can be drawn");
+    let constants = session.constants().into_iter().map(|(array, bytes)| (array.name.clone(), bytes));
     let mut all: BTreeMap<_, _> = constants.collect();
     let mut next = scenes.start;
-    let drawn = drawer.draw(scenes.clone(), |window| {
+    let drawn = session.draw(scenes.clone(), |window| {
         assert_eq!(window.scenes.start, next);
         next = window.scenes.end;
         for (array, bytes) in window.arrays() {
@@ -66,25 +68,33 @@ fn floats(bytes: &[u8]) -> Vec<f32> {
 
 /// A group of every sort.
 fn everything() -> SceneBuilder {
-    let levels = || Levels::even(0.2, 0.6, 10);
+    let levels = || LrvLevels::even(0.2, 0.6, 10);
     let target = |name, aim| Targets::new(name, &surfaces(), aim).bounds(Bounds::Scaled);
     let plain = |name, aim| Targets::new(name, &surfaces(), aim);
     let log = Intensity::LogUniform(0.15, 150.0);
-    Scene::new(1000)
+    Scene::builder(1000)
         .seed(7)
-        .group(Illuminants::new("lights", &daylight(), 3).intensity(log, Sharing::Scene))
-        .group(Illuminants::new("lamps", &daylight(), 2).intensity(Intensity::Data, Sharing::Each))
-        .group(Illuminants::new("twins", &daylight(), 4).same_shape().intensity(log, Sharing::Each))
-        .group(Illuminants::new("panels", &daylight(), 4).same_shape().fixed().intensity(log, Sharing::Each))
+        .group(Illuminants::new("lights", &daylight(), 3).intensity(log, IntensityScope::Scene))
+        .group(Illuminants::new("lamps", &daylight(), 2).intensity(Intensity::Data, IntensityScope::Light))
+        .group(Illuminants::new("twins", &daylight(), 4).same_shape().intensity(log, IntensityScope::Light))
+        .group(
+            Illuminants::new("panels", &daylight(), 4)
+                .same_shape()
+                .fixed()
+                .intensity(log, IntensityScope::Light),
+        )
         .group(Illuminants::new("sun", &daylight(), 1).mean(&colorimetry::d65(Grid::DEFAULT)))
         .group(Surfaces::new("background", &surfaces(), 99))
         .group(Surfaces::new("walls", &surfaces(), 5).fixed())
-        .group(target("target", Aim::Lrv(levels())).count(2))
-        .group(target("scaled", Aim::Lrv(levels())).copies(Copies::Scaled))
-        .group(target("same", Aim::Lrv(levels())).copies(Copies::SameShape))
-        .group(target("any", Aim::Lrv(Levels::Uniform(0.1, 0.6))))
-        .group(plain("colour", Aim::Xyz([0.3, 0.3, 0.3])))
-        .group(plain("hues", Aim::Hue(Hue { levels: 6, saturation: (0.2, 0.3), lightness: (0.3, 0.4) })))
+        .group(target("target", TargetConstraint::Lrv(levels())).count(2))
+        .group(target("scaled", TargetConstraint::Lrv(levels())).copies(Copies::Scaled))
+        .group(target("same", TargetConstraint::Lrv(levels())).copies(Copies::SameShape))
+        .group(target("any", TargetConstraint::Lrv(LrvLevels::Uniform(0.1, 0.6))))
+        .group(plain("colour", TargetConstraint::Xyz([0.3, 0.3, 0.3])))
+        .group(plain(
+            "hues",
+            TargetConstraint::Hue(Hue { levels: 6, saturation: (0.2, 0.3), lightness: (0.3, 0.4) }),
+        ))
         .group(Targets::flat("grey", levels()))
 }
 
@@ -120,13 +130,13 @@ fn nothing_depends_on_what_else_is_drawn() {
         let bytes = array.bytes();
         assert!(one[&array.name] == all[&array.name][37 * bytes..38 * bytes], "{} of scene 37", array.name);
     }
-    let reordered = Scene::new(40)
+    let reordered = Scene::builder(40)
         .seed(7)
         .group(Surfaces::new("background", &surfaces(), 120))
         .group(Surfaces::new("another", &surfaces(), 3))
         .group(
             Illuminants::new("lights", &daylight(), 3)
-                .intensity(Intensity::LogUniform(0.15, 150.0), Sharing::Scene),
+                .intensity(Intensity::LogUniform(0.15, 150.0), IntensityScope::Scene),
         );
     let reordered = arrays(&reordered.build().expect("it is possible"), cpu(), 0..40);
     assert!(reordered["lights"][..] == all["lights"][..40 * 3 * 31 * 4]);
@@ -144,7 +154,7 @@ fn a_shared_intensity_multiplies_all_lights_of_a_scene() {
     let all = arrays(&everything().build().expect("it is possible"), cpu(), 0..20);
     let (lights, intensity) = (floats(&all["lights"]), floats(&all["lights_intensity"]));
     assert_eq!((lights.len(), intensity.len()), (20 * 3 * 31, 20));
-    let recipe = Recipe::new(&daylight()).build().expect("it is possible");
+    let recipe = Recipe::builder(&daylight()).build().expect("it is possible");
     let stream = Stream::named(7, "lights").in_rows(3);
     for (i, spectrum) in lights.chunks_exact(31).enumerate() {
         let plain = recipe.draw::<f32>(stream, i as u64);
@@ -170,7 +180,7 @@ fn a_shared_intensity_multiplies_all_lights_of_a_scene() {
 #[test]
 fn a_mean_can_be_replaced() {
     let d65 = colorimetry::d65(Grid::DEFAULT);
-    let scene = Scene::new(4000).group(Illuminants::new("sun", &daylight(), 5).mean(&d65));
+    let scene = Scene::builder(4000).group(Illuminants::new("sun", &daylight(), 5).mean(&d65));
     let spectra = floats(&arrays(&scene.build().expect("it is possible"), cpu(), 0..4000)["sun"]);
     let power = d65.iter().sum::<f64>() / 31.0;
     for (band, expected) in d65.iter().map(|v| v / power).enumerate() {
@@ -289,18 +299,18 @@ fn a_host_records_the_same_scenes() {
 
 #[test]
 fn what_is_left_out_is_said() {
-    let shaders = |name| preset(name).outline(1000).shaders;
+    let shaders = |name| preset(name).workload(1000).shaders;
     assert_eq!([shaders("condition1"), shaders("condition2"), shaders("condition3")], [0, 1, 2]);
-    let outline = preset("condition1").outline(1000);
-    assert_eq!(outline.draws, 3 + 999 + 1000);
-    let text = outline.left_out.join("\n");
+    let workload = preset("condition1").workload(1000);
+    assert_eq!(workload.draws, 3 + 999 + 1000);
+    let text = workload.left_out.join("\n");
     assert!(text.contains("background: it is fixed, so it is drawn and stored once"), "{text}");
-    let shared = Scene::new(10)
+    let shared = Scene::builder(10)
         .group(Surfaces::new("a", &surfaces(), 3))
         .group(Surfaces::new("b", &surfaces(), 4))
         .build()
         .expect("it is possible")
-        .outline(10);
+        .workload(10);
     assert_eq!(shared.shaders, 1);
     let text = shared.left_out.join("\n");
     assert!(

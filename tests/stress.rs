@@ -2,13 +2,13 @@
 //!
 //! Without an adapter the second test fails; `WGPU_ADAPTER_NAME` picks one.
 
-use spectroll::stress::cases;
-use spectroll::{Choice, Engine};
+use spectroll::evaluation::stress::cases;
+use spectroll::{Engine, EngineChoice};
 
 /// What "does not hang" means, seconds: a hundred times what the slowest case takes, but for compiling long shaders.
 const SOON: f64 = 60.0;
 
-fn assert_right_answers(choice: &Choice) {
+fn assert_right_answers(choice: &EngineChoice) {
     let engine = Engine::new(choice).unwrap_or_else(|e| panic!("these cases need an engine: {e}"));
     let outcomes: Vec<_> = cases().map(|case| case.run(&engine)).collect();
     println!("on {engine}:");
@@ -23,10 +23,10 @@ fn assert_right_answers(choice: &Choice) {
 
 #[test]
 fn every_case_has_its_right_answer_on_the_cpu() {
-    assert_right_answers(&Choice::Cpu);
+    assert_right_answers(&EngineChoice::Cpu);
 }
 
 #[test]
 fn every_case_has_its_right_answer_on_an_adapter() {
-    assert_right_answers(&Choice::Gpu);
+    assert_right_answers(&EngineChoice::Gpu);
 }

@@ -8,10 +8,10 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
-use spectroll::statistics::tinted;
+use spectroll::evaluation::statistics::tinted;
 use spectroll::{
-    Bounds, Builtin, Choice, Dataset, Draws, Engine, EngineError, Extend, Fit, Grid, Kind, Model, Parts,
-    Real, Recipe, Stream, Tally, colorimetry,
+    Bounds, BuiltinTable, Dataset, DrawRange, DrawStatus, Engine, EngineChoice, EngineError, Extrapolation,
+    Fit, Grid, Model, ModelParts, Real, Recipe, SpectrumKind, Stream, colorimetry,
 };
 
 /// How far an adapter that fuses may be off, in units in the last place of the largest term.
@@ -19,11 +19,13 @@ const ULPS: f64 = 16.0;
 
 fn gpu() -> &'static Engine {
     static GPU: OnceLock<Engine> = OnceLock::new();
-    GPU.get_or_init(|| Engine::new(&Choice::Gpu).unwrap_or_else(|e| panic!("twins need an adapter: {e}")))
+    GPU.get_or_init(|| {
+        Engine::new(&EngineChoice::Gpu).unwrap_or_else(|e| panic!("twins need an adapter: {e}"))
+    })
 }
 
 fn cpu() -> Engine {
-    Engine::new(&Choice::Cpu).expect("the CPU is always there")
+    Engine::new(&EngineChoice::Cpu).expect("the CPU is always there")
 }
 
 /// A recipe, and what it was made of.
@@ -39,7 +41,7 @@ struct Case {
 
 impl Case {
     fn new(model: &Model, target: Option<(f64, Bounds)>, scale: f64) -> Case {
-        let recipe = Recipe::new(model).covariance_scale(scale);
+        let recipe = Recipe::builder(model).covariance_scale(scale);
         let recipe = match target {
             Some((lrv, bounds)) => recipe.lrv(lrv).bounds(bounds),
             None => recipe,
@@ -78,26 +80,26 @@ impl Case {
 #[derive(Clone, PartialEq)]
 struct Rows {
     spectra: Vec<f32>,
-    tallies: Vec<Tally>,
+    statuses: Vec<DrawStatus>,
 }
 
-fn rows(engine: &Engine, recipe: &Recipe, draws: Draws) -> Rows {
-    let mut rows = Rows { spectra: Vec::new(), tallies: Vec::new() };
+fn rows(engine: &Engine, recipe: &Recipe, draws: DrawRange) -> Rows {
+    let mut rows = Rows { spectra: Vec::new(), statuses: Vec::new() };
     let made = engine.draw(recipe, draws, |batch| {
         rows.spectra.extend_from_slice(batch.spectra());
-        rows.tallies.extend_from_slice(batch.tallies());
+        rows.statuses.extend_from_slice(batch.statuses());
         Ok::<_, EngineError>(())
     });
     let summary = made.unwrap_or_else(|e| panic!("{engine}: {e}"));
-    assert_eq!((summary.draws, rows.tallies.len() as u64), (draws.count, draws.count));
+    assert_eq!((summary.draws, rows.statuses.len() as u64), (draws.count, draws.count));
     rows
 }
 
 /// Whether two engines agree as they should: to the bit, or as arithmetic that fuses may.
-fn compare(case: &Case, draws: Draws, a: &Rows, b: &Rows, to_the_bit: bool) -> Result<(), String> {
+fn compare(case: &Case, draws: DrawRange, a: &Rows, b: &Rows, to_the_bit: bool) -> Result<(), String> {
     let bands = case.recipe.model().bands();
     let mut flips = 0;
-    for (i, (ta, tb)) in a.tallies.iter().zip(&b.tallies).enumerate() {
+    for (i, (ta, tb)) in a.statuses.iter().zip(&b.statuses).enumerate() {
         let index = draws.first.wrapping_add(i as u64);
         if to_the_bit && ta != tb {
             return Err(format!("draw {index}: {ta:?} against {tb:?}"));
@@ -125,11 +127,12 @@ fn compare(case: &Case, draws: Draws, a: &Rows, b: &Rows, to_the_bit: bool) -> R
 /// What holds of the draws of every engine: they are physical, and have the LRV that they should.
 fn assert_valid(case: &Case, rows: &Rows) {
     let model = case.recipe.model();
-    let below_one = model.kind() == Kind::Reflectance && !matches!(case.target, Some((_, Bounds::Base)));
-    for (row, tally) in rows.spectra.chunks_exact(model.bands()).zip(&rows.tallies) {
+    let below_one =
+        model.kind() == SpectrumKind::Reflectance && !matches!(case.target, Some((_, Bounds::Base)));
+    for (row, status) in rows.spectra.chunks_exact(model.bands()).zip(&rows.statuses) {
         assert!(row.iter().all(|&s| s > 0.0 && s.is_finite() && !(below_one && s >= 1.0)), "{row:?}");
-        let above_one = model.kind() == Kind::Reflectance && row.iter().any(|&s| s >= 1.0);
-        assert_eq!(tally.above_one(), above_one, "{row:?}");
+        let above_one = model.kind() == SpectrumKind::Reflectance && row.iter().any(|&s| s >= 1.0);
+        assert_eq!(status.above_one(), above_one, "{row:?}");
         if let Some((lrv, _)) = case.target {
             let found = case.lrv(&row.iter().map(|&s| f64::from(s)).collect::<Vec<_>>());
             assert!((found - lrv).abs() < 2e-6, "an LRV of {found} where {lrv} was asked for");
@@ -138,7 +141,7 @@ fn assert_valid(case: &Case, rows: &Rows) {
 }
 
 /// Makes `draws` on both engines, holds them against each other and against `Recipe::draw`, and returns the CPU's.
-fn assert_twins(case: &Case, draws: Draws) -> Rows {
+fn assert_twins(case: &Case, draws: DrawRange) -> Rows {
     let (ours, theirs) = (rows(&cpu(), &case.recipe, draws), rows(gpu(), &case.recipe, draws));
     let adapter = gpu().adapter().expect("it draws on an adapter");
     if let Err(difference) = compare(case, draws, &ours, &theirs, adapter.kind == "software") {
@@ -147,10 +150,10 @@ fn assert_twins(case: &Case, draws: Draws) -> Rows {
     assert_valid(case, &ours);
     assert_valid(case, &theirs);
     let bands = case.recipe.model().bands();
-    for i in (0..ours.tallies.len()).step_by(draws.count.div_ceil(5000).max(1) as usize) {
+    for i in (0..ours.statuses.len()).step_by(draws.count.div_ceil(5000).max(1) as usize) {
         let drawn = case.recipe.draw::<f32>(draws.stream, draws.first.wrapping_add(i as u64));
         let row = &ours.spectra[i * bands..(i + 1) * bands];
-        assert_eq!((drawn.spectrum(), drawn.tally()), (row, ours.tallies[i]));
+        assert_eq!((drawn.spectrum(), drawn.status()), (row, ours.statuses[i]));
     }
     ours
 }
@@ -159,11 +162,11 @@ fn builtin(name: &str) -> Model {
     Model::builtin(name).expect("it is built in")
 }
 
-fn reflectances(tables: &[Builtin], grid: &str, components: usize) -> Model {
+fn reflectances(tables: &[BuiltinTable], grid: &str, components: usize) -> Model {
     let tables: Vec<_> = tables.iter().map(|t| t.table()).collect();
     let grid = grid.parse::<Grid>().expect("a grid");
-    let data = Dataset::new(&tables, grid, Extend::Error).expect("the tables cover the grid");
-    Fit::new(Kind::Reflectance).components(components).fit(&data).expect("the data have that rank")
+    let data = Dataset::new(&tables, grid, Extrapolation::Error).expect("the tables cover the grid");
+    Fit::new(SpectrumKind::Reflectance).components(components).fit(&data).expect("the data have that rank")
 }
 
 const ALL_BOUNDS: [Bounds; 3] = [Bounds::Base, Bounds::Scaled, Bounds::Both];
@@ -180,7 +183,7 @@ fn every_rule_at_a_target_lrv() {
     for (lrv, bounds) in [0.2, 0.6].into_iter().flat_map(|lrv| ALL_BOUNDS.map(|bounds| (lrv, bounds))) {
         let case = Case::new(&builtin("munsell-vrhel"), Some((lrv, bounds)), 1.0);
         let rows = assert_twins(&case, Stream::new(2).draws(0..20_001));
-        let above_one = rows.tallies.iter().filter(|t| t.above_one()).count();
+        let above_one = rows.statuses.iter().filter(|t| t.above_one()).count();
         println!("LRV {lrv} {bounds:?}: {above_one} of 20,001 reach 1 somewhere");
         assert_eq!(above_one > 0, bounds == Bounds::Base);
     }
@@ -202,7 +205,7 @@ fn bands_that_are_alike() {
     for edge in [31, 12] {
         let level = |band: usize| if band < edge { 1.0 } else { 0.5 };
         let basis = DMatrix::from_fn(1, 31, |_, band| level(band)).normalize();
-        let model = Model::new(Parts {
+        let model = Model::new(ModelParts {
             mean: DVector::from_fn(31, |band, _| 0.4 * level(band)),
             basis,
             weight_mean: DVector::zeros(1),
@@ -220,7 +223,7 @@ fn bands_that_are_alike() {
 #[test]
 fn any_number_of_components() {
     for components in [1, 2, 3, 5, 12, 31] {
-        let model = reflectances(&[Builtin::Munsell, Builtin::Vrhel], "400:10:700", components);
+        let model = reflectances(&[BuiltinTable::Munsell, BuiltinTable::Vrhel], "400:10:700", components);
         assert_twins(&Case::plain(&model), Stream::new(4).draws(0..4097));
     }
 }
@@ -228,7 +231,7 @@ fn any_number_of_components() {
 /// 341 bands: up to 6 components are written out in straight lines, 7 and more run in loops.
 #[test]
 fn models_too_large_for_straight_lines() {
-    let of = |components| reflectances(&[Builtin::Vrhel], "390:1:730", components);
+    let of = |components| reflectances(&[BuiltinTable::Vrhel], "390:1:730", components);
     let draws = Stream::named(5, "wall").draws(77..77 + 4097);
     assert_twins(&Case::plain(&of(6)), draws);
     assert_twins(&Case::plain(&of(7)), draws);
@@ -263,7 +266,7 @@ fn any_index_seed_and_stream() {
         }
     }
     let stream = Stream::new(7);
-    let around = assert_twins(&case, Draws { stream, first: u64::MAX - 4, count: 11 });
+    let around = assert_twins(&case, DrawRange { stream, first: u64::MAX - 4, count: 11 });
     let from_zero = rows(&cpu(), &case.recipe, stream.draws(0..6));
     assert_eq!(around.spectra[5 * case.recipe.model().bands()..], from_zero.spectra);
 }
@@ -290,13 +293,13 @@ fn any_split_gives_the_same_bytes() {
     let whole = stream.draws(first..first + count);
     let mut rng = Stream::new(9).rng();
     for engine in [&cpu(), gpu()] {
-        let mut pieces = Rows { spectra: Vec::new(), tallies: Vec::new() };
+        let mut pieces = Rows { spectra: Vec::new(), statuses: Vec::new() };
         let mut next = 0;
         while next < count {
             let piece = (1 + u64::from(rng.next_u32() % 3000)).min(count - next);
             let rows = rows(engine, &case.recipe, stream.draws(first + next..first + next + piece));
             pieces.spectra.extend(rows.spectra);
-            pieces.tallies.extend(rows.tallies);
+            pieces.statuses.extend(rows.statuses);
             next += piece;
         }
         assert!(rows(engine, &case.recipe, whole) == pieces, "{engine}: the pieces differ from the whole");
@@ -311,17 +314,17 @@ fn the_tolerance_for_hardware_is_neither_tight_nor_loose() {
     for case in targets.map(|target| Case::new(&builtin("munsell-vrhel"), target, 1.0)) {
         let draws = Stream::new(10).draws(0..20_000);
         let ours = rows(&cpu(), &case.recipe, draws);
-        let (spectra, tallies): (Vec<_>, Vec<_>) = (0..draws.count)
+        let (spectra, statuses): (Vec<_>, Vec<_>) = (0..draws.count)
             .map(|i| case.recipe.draw::<f64>(draws.stream, i))
-            .map(|drawn| (drawn.spectrum().to_vec(), drawn.tally()))
+            .map(|drawn| (drawn.spectrum().to_vec(), drawn.status()))
             .unzip();
-        let oracle = Rows { spectra: spectra.concat().iter().map(|&s| s as f32).collect(), tallies };
+        let oracle = Rows { spectra: spectra.concat().iter().map(|&s| s as f32).collect(), statuses };
         assert_eq!(compare(&case, draws, &ours, &oracle, false), Ok(()));
         let mut off = oracle.clone();
-        off.spectra[31] += (2.0 * ULPS * case.ulp(draws.stream, 1, off.tallies[1].attempts())) as f32;
+        off.spectra[31] += (2.0 * ULPS * case.ulp(draws.stream, 1, off.statuses[1].attempts())) as f32;
         assert!(compare(&case, draws, &ours, &off, false).is_err());
         let mut flipped = oracle;
-        flipped.tallies.rotate_left(1);
+        flipped.statuses.rotate_left(1);
         assert!(compare(&case, draws, &ours, &flipped, false).is_err());
     }
 }

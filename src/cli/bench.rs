@@ -7,10 +7,10 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use spectroll::costs::{Costs, Share};
+use spectroll::evaluation::costs::{Costs, Share};
 use spectroll::{
-    Bounds, Builtin, Choice, Dataset, Engine, Extend, Fit, Grid, Intensity, Kind, Layout, Model, Quantity,
-    Recipe, RecipeBuilder, Stream, adapters,
+    Bounds, BuiltinTable, Dataset, Engine, EngineChoice, Extrapolation, Fit, Grid, Intensity, Layout, Model,
+    Quantity, Recipe, RecipeBuilder, SpectrumKind, Stream, adapters,
 };
 
 use super::{EngineArguments, check_interrupt, model, watch_interrupts};
@@ -72,11 +72,14 @@ struct Rates {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let choices = match arguments.engine.choice() {
         Some(choice) => vec![choice],
-        None => (0..adapters().len()).map(|i| Choice::Adapter(i.to_string())).chain([Choice::Cpu]).collect(),
+        None => (0..adapters().len())
+            .map(|i| EngineChoice::Adapter(i.to_string()))
+            .chain([EngineChoice::Cpu])
+            .collect(),
     };
     let recipes = match arguments.costs {
         true => costs()?,
-        false => vec![(arguments.model.clone(), Recipe::new(&model(&arguments.model)?))],
+        false => vec![(arguments.model.clone(), Recipe::builder(&model(&arguments.model)?))],
     };
     let recipes = recipes.into_iter().map(|(name, builder)| Ok((name, builder.build()?)));
     let recipes = recipes.collect::<anyhow::Result<Vec<_>>>()?;
@@ -132,12 +135,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// Recipes that differ from the first in one thing each.
 fn costs() -> anyhow::Result<Vec<(String, RecipeBuilder)>> {
     let (surface, light) = (Model::builtin("munsell-vrhel")?, Model::builtin("granada")?);
-    let surfaces = || Recipe::new(&surface);
-    let lights = || Recipe::new(&light);
+    let surfaces = || Recipe::builder(&surface);
+    let lights = || Recipe::builder(&light);
     let of = |grid: &str, components| {
-        let tables = [Builtin::Munsell.table(), Builtin::Vrhel.table()];
-        let data = Dataset::new(&tables, grid.parse::<Grid>()?, Extend::Error)?;
-        anyhow::Ok(Recipe::new(&Fit::new(Kind::Reflectance).components(components).fit(&data)?))
+        let tables = [BuiltinTable::Munsell.table(), BuiltinTable::Vrhel.table()];
+        let data = Dataset::new(&tables, grid.parse::<Grid>()?, Extrapolation::Error)?;
+        anyhow::Ok(Recipe::builder(&Fit::new(SpectrumKind::Reflectance).components(components).fit(&data)?))
     };
     let everything = Quantity::ALL.into_iter().filter(|q| *q != Quantity::Intensity);
     Ok([
@@ -145,7 +148,7 @@ fn costs() -> anyhow::Result<Vec<(String, RecipeBuilder)>> {
         ("  attempts alone", surfaces().quantities([Quantity::Attempts])),
         ("  lrv", surfaces().quantities([Quantity::Lrv])),
         ("  xyz", surfaces().quantities([Quantity::Xyz])),
-        ("  srgb", surfaces().quantities([Quantity::Srgb])),
+        ("  srgb", surfaces().quantities([Quantity::LinearSrgb])),
         ("  weights", surfaces().quantities([Quantity::Weights])),
         ("  everything", surfaces().quantities(everything)),
         ("  spectra in 16 bits", surfaces().half_spectra()),
@@ -181,10 +184,10 @@ fn parts(engine: &Engine, runs: u32) -> anyhow::Result<Option<Vec<Share>>> {
 }
 
 fn measure(engine: &Engine, name: &str, recipe: &Recipe, runs: u32, seconds: f64) -> anyhow::Result<Rates> {
-    let mut drawer = engine.drawer(recipe)?;
+    let mut session = engine.session(recipe)?;
     let mut time = |count: u64| {
         let start = Instant::now();
-        drawer.draw(Stream::new(0).draws(0..count), |_| anyhow::Ok(check_interrupt()?))?;
+        session.draw(Stream::new(0).draws(0..count), |_| anyhow::Ok(check_interrupt()?))?;
         anyhow::Ok(start.elapsed().as_secs_f64())
     };
     // The first run pays for compiling the shader; the second says how many draws fill the time.

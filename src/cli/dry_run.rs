@@ -5,10 +5,10 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use spectroll::output::{Field, Format, Schema};
+use spectroll::output::{Field, FileFormat, Schema};
 use spectroll::{Engine, Recipe, Stream};
 
-use super::sink::{OutputArguments, Target};
+use super::sink::{Destination, OutputArguments};
 use super::{folder, grouped};
 
 /// How long the drawing is tried.
@@ -35,7 +35,7 @@ pub(super) struct DryRun {
     /// Free bytes where it would be; nothing of standard output, nor where there is no such folder.
     free: Option<u64>,
     #[serde(skip)]
-    target: Target,
+    target: Destination,
 }
 
 #[derive(Serialize)]
@@ -48,7 +48,7 @@ struct Array {
 impl DryRun {
     pub(super) fn new(
         output: &OutputArguments,
-        target: Target,
+        target: Destination,
         schema: &Schema,
         recipe: &Recipe,
         engine: &Engine,
@@ -58,13 +58,14 @@ impl DryRun {
             shape: field.shape(schema.count),
             dtype: field.stored.name(),
         };
-        let is_text = matches!(target, Target::Stdout | Target::Spd | Target::File(Format::Csv));
+        let is_text =
+            matches!(target, Destination::Stdout | Destination::Spd | Destination::File(FileFormat::Csv));
         let row = match is_text {
             true => schema.fields.iter().map(|field| TEXT * field.width as u64).sum(),
             false => schema.row_bytes(),
         };
         let chunks = match target {
-            Target::Set(layout) => {
+            Destination::Set(layout) => {
                 let plan = output.plan(layout, schema);
                 Some((plan.chunks(), plan.chunk))
             }
@@ -79,7 +80,7 @@ impl DryRun {
             acceptance: recipe.acceptance(),
             engine: engine.to_string(),
             draws_per_second: rate(recipe, engine)?,
-            free: if target == Target::Stdout { None } else { free(&output.output) },
+            free: if target == Destination::Stdout { None } else { free(&output.output) },
             target,
         })
     }
@@ -98,15 +99,17 @@ impl DryRun {
             (Some((chunks, draws)), _) => {
                 writeln!(out, "  {bytes} in {} chunks of {} draws", grouped(chunks), grouped(draws))?;
             }
-            (None, Target::Spd) => writeln!(out, "  {} files of text", grouped(self.draws))?,
-            (None, Target::Stdout | Target::File(Format::Csv)) => writeln!(out, "  about {bytes} of text")?,
+            (None, Destination::Spd) => writeln!(out, "  {} files of text", grouped(self.draws))?,
+            (None, Destination::Stdout | Destination::File(FileFormat::Csv)) => {
+                writeln!(out, "  about {bytes} of text")?
+            }
             (None, _) => writeln!(out, "  {bytes}")?,
         }
         let (engine, accepted) = (&self.engine, 100.0 * self.acceptance);
         writeln!(out, "  drawn by {engine}, about {accepted:.2} % of the candidates accepted")?;
         let (rate, seconds) = (self.draws_per_second / 1e6, self.draws as f64 / self.draws_per_second);
         writeln!(out, "  {seconds:.1} s of drawing at {rate:.1} million a second, besides the writing")?;
-        if self.target != Target::Stdout {
+        if self.target != Destination::Stdout {
             writeln!(out, "  {}", room(Path::new(&self.output), self.bytes, self.free))?;
         }
         Ok(())
@@ -115,11 +118,11 @@ impl DryRun {
 
 /// Draws a second, of a short trial.
 fn rate(recipe: &Recipe, engine: &Engine) -> anyhow::Result<f64> {
-    let mut drawer = engine.drawer(recipe)?;
+    let mut session = engine.session(recipe)?;
     let mut count = 1000;
     loop {
         let start = Instant::now();
-        drawer.draw(Stream::named(0, "trial").draws(0..count), |_| anyhow::Ok(()))?;
+        session.draw(Stream::named(0, "trial").draws(0..count), |_| anyhow::Ok(()))?;
         let taken = start.elapsed();
         if taken > TRIAL {
             return Ok(count as f64 / taken.as_secs_f64());

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use spectroll::output::write_file;
-use spectroll::{Builtin, Dataset, Extend, Fit, Grid, Kind, Model, Normalization, Table};
+use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, Grid, Model, Normalization, SpectrumKind, Table};
 
 use super::{Usage, existing, grouped};
 
@@ -76,9 +76,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .collect::<anyhow::Result<Vec<_>>>()?;
     let kind = kind(arguments, &tables)?;
     let extend = match arguments.extend {
-        ExtendName::Error => Extend::Error,
-        ExtendName::Hold => Extend::Hold,
-        ExtendName::Zero => Extend::Zero,
+        ExtendName::Error => Extrapolation::Error,
+        ExtendName::Hold => Extrapolation::Hold,
+        ExtendName::Zero => Extrapolation::Zero,
     };
     let data = Dataset::new(&tables, arguments.wavelengths.unwrap_or(Grid::DEFAULT), extend)?;
     let mut fit = Fit::new(kind).components(arguments.components);
@@ -110,7 +110,7 @@ fn report(model: &Model, data: &Dataset, path: &Path) {
 
 /// The table of a built-in name, a file, or file:variable; at these wavelengths where the file does not say.
 fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
-    if let Some(builtin) = Builtin::named(name) {
+    if let Some(builtin) = BuiltinTable::named(name) {
         return Ok(builtin.table());
     }
     let (path, variable) = match name.rsplit_once(':') {
@@ -121,11 +121,11 @@ fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
 }
 
 /// What the spectra are: as said, else as their names say, if those agree.
-fn kind(arguments: &Arguments, tables: &[Table]) -> anyhow::Result<Kind> {
+fn kind(arguments: &Arguments, tables: &[Table]) -> anyhow::Result<SpectrumKind> {
     if let Some(kind) = arguments.kind {
         return Ok(match kind {
-            KindName::Reflectance => Kind::Reflectance,
-            KindName::Illuminant => Kind::Illuminant,
+            KindName::Reflectance => SpectrumKind::Reflectance,
+            KindName::Illuminant => SpectrumKind::Illuminant,
         });
     }
     let kinds: Vec<_> = tables.iter().map(Table::kind).collect();

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Command;
 use clap_complete::Shell;
 use clap_mangen::Man;
-use spectroll::output::{Existing, OutputError, write_file};
+use spectroll::output::{IfExists, OutputError, write_file};
 
 /// Print completions for a shell
 #[derive(clap::Args)]
@@ -42,7 +42,7 @@ pub(crate) fn man(mut command: Command, arguments: &ManArguments) -> anyhow::Res
         let page = Man::new(command.clone());
         let mut text = Vec::new();
         page.render(&mut text)?;
-        write_file(&folder.join(page.get_filename()), Existing::Replace, &text)?;
+        write_file(&folder.join(page.get_filename()), IfExists::Replace, &text)?;
     }
     Ok(())
 }

@@ -203,7 +203,7 @@ mod tests {
     fn the_table_fits_80_columns_and_has_a_row_a_component() {
         for name in Model::BUILTIN {
             let model = Model::builtin(name).unwrap();
-            let table = table(name, &model, &Recipe::new(&model).build());
+            let table = table(name, &model, &Recipe::builder(&model).build());
             assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
             let rows = table.lines().skip_while(|line| !line.starts_with("component ")).count();
             assert_eq!(rows, 2 + model.components(), "{table}");

@@ -39,9 +39,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
-use spectroll::output::{Existing, OutputError};
+use spectroll::output::{IfExists, OutputError};
 use spectroll::scene::SceneError;
-use spectroll::{Choice, DatasetError, EngineError, FitError, Model, ModelError, RecipeError, TextError};
+use spectroll::{
+    DatasetError, EngineChoice, EngineError, FitError, Model, ModelError, RecipeError, WgslError,
+};
 
 /// Draws random, physically valid natural spectra on the GPU.
 #[derive(Parser)]
@@ -113,13 +115,13 @@ struct EngineArguments {
 
 impl EngineArguments {
     /// What was asked for; nothing where it was not.
-    fn choice(&self) -> Option<Choice> {
+    fn choice(&self) -> Option<EngineChoice> {
         let named = self.engine.map(|engine| match engine {
-            EngineName::Auto => Choice::Auto,
-            EngineName::Gpu => Choice::Gpu,
-            EngineName::Cpu => Choice::Cpu,
+            EngineName::Auto => EngineChoice::Auto,
+            EngineName::Gpu => EngineChoice::Gpu,
+            EngineName::Cpu => EngineChoice::Cpu,
         });
-        self.adapter.clone().map(Choice::Adapter).or(named)
+        self.adapter.clone().map(EngineChoice::Adapter).or(named)
     }
 }
 
@@ -217,7 +219,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         5
     } else if error.is::<RecipeError>()
         || error.is::<SceneError>()
-        || error.is::<TextError>()
+        || error.is::<WgslError>()
         || error.is::<Usage>()
         || error.downcast_ref::<OutputError>().is_some_and(is_request)
     {
@@ -257,8 +259,8 @@ fn folder(path: &Path) -> &Path {
 }
 
 /// What `--force` says of a file that exists.
-fn existing(force: bool) -> Existing {
-    if force { Existing::Replace } else { Existing::Keep }
+fn existing(force: bool) -> IfExists {
+    if force { IfExists::Replace } else { IfExists::Refuse }
 }
 
 /// How many threads: more than any machine has cores would only take long to start.

@@ -10,8 +10,8 @@ use kuva::prelude::{
     TickFormat,
 };
 use kuva::render::render::{Primitive, Scene, TextAnchor};
-use spectroll::plot::{self, COLOURS, DARK, Heading, LABEL_SIZE, QUIET};
-use spectroll::{Grid, Kind, Model, Recipe, Stream, colorimetry};
+use spectroll::evaluation::plot::{self, COLOURS, DARK, Heading, LABEL_SIZE, QUIET};
+use spectroll::{Grid, Model, Recipe, SpectrumKind, Stream, colorimetry};
 
 /// The size of a panel; two by two make a picture.
 const PANEL: (f64, f64) = (480.0, 350.0);
@@ -202,8 +202,8 @@ impl Picture<'_> {
         let grid = self.model.grid();
         let colours = Colours::new(self.model);
         let stroke = match self.model.kind() {
-            Kind::Reflectance => 1.15,
-            Kind::Illuminant => 0.9, // they lie close together
+            SpectrumKind::Reflectance => 1.15,
+            SpectrumKind::Illuminant => 0.9, // they lie close together
         };
         let line = |draw: &Vec<f64>| {
             LinePlot::new()
@@ -216,8 +216,8 @@ impl Picture<'_> {
         let title = match (draws.len(), self.model.kind(), &colours) {
             (0, ..) => "No draws: the plain recipe is refused".to_owned(),
             (n, _, Colours::Unseen) => format!("{n} draws"),
-            (n, Kind::Reflectance, _) => format!("{n} draws, in their colours under D65"),
-            (n, Kind::Illuminant, _) => format!("{n} draws, in the colours of their light"),
+            (n, SpectrumKind::Reflectance, _) => format!("{n} draws, in their colours under D65"),
+            (n, SpectrumKind::Illuminant, _) => format!("{n} draws, in the colours of their light"),
         };
         // On white, pale surfaces and all lights would drown.
         let night = ShadedRegion::horizontal(limits.0, limits.1).with_color(DARK).with_opacity(1.0);
@@ -232,8 +232,8 @@ impl Picture<'_> {
 
     fn value_label(&self) -> &'static str {
         match self.model.kind() {
-            Kind::Reflectance => "reflectance",
-            Kind::Illuminant => "relative power",
+            SpectrumKind::Reflectance => "reflectance",
+            SpectrumKind::Illuminant => "relative power",
         }
     }
 
@@ -241,8 +241,8 @@ impl Picture<'_> {
     fn value_limits<'v>(&self, values: impl Iterator<Item = &'v f64>) -> (f64, f64) {
         let (low, high) = values.fold((0.0, 0.0), |(a, b): (f64, f64), &v| (a.min(v), b.max(v)));
         match self.model.kind() {
-            Kind::Reflectance if high <= 1.0 => (1.05 * low, 1.0),
-            Kind::Illuminant if high <= 0.0 => (1.05 * low, 1.0),
+            SpectrumKind::Reflectance if high <= 1.0 => (1.05 * low, 1.0),
+            SpectrumKind::Illuminant if high <= 0.0 => (1.05 * low, 1.0),
             _ => (1.05 * low, 1.05 * high),
         }
     }
@@ -263,8 +263,8 @@ impl Colours {
         let grid = model.grid();
         match (colorimetry::xyz_weights(grid), model.kind()) {
             (None, _) => Colours::Unseen,
-            (Some(weights), Kind::Reflectance) => Colours::Reflected(weights),
-            (Some(_), Kind::Illuminant) => Colours::Emitted(colorimetry::cmf(grid)),
+            (Some(weights), SpectrumKind::Reflectance) => Colours::Reflected(weights),
+            (Some(_), SpectrumKind::Illuminant) => Colours::Emitted(colorimetry::cmf(grid)),
         }
     }
 
@@ -378,7 +378,7 @@ mod tests {
     use super::*;
 
     fn svg(model: &Model) -> String {
-        let recipe = Recipe::new(model).build();
+        let recipe = Recipe::builder(model).build();
         let picture = Picture { model, recipe: recipe.as_ref().ok(), seed: 0 };
         plot::svg(&picture.drawing())
     }

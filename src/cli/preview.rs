@@ -7,8 +7,8 @@
 use std::ops::Range;
 
 use kuva::render::render::{Primitive, Scene as Drawing, TextAnchor};
-use spectroll::plot::{self, DARK, INK, PALE, QUIET, line, rectangle};
-use spectroll::scene::{Content, Role, Scene, Window};
+use spectroll::evaluation::plot::{self, DARK, INK, PALE, QUIET, line, rectangle};
+use spectroll::scene::{GroupKind, Scene, Window};
 use spectroll::{Engine, EngineError, Grid, colorimetry};
 
 /// Tiles in a row, and rows of them.
@@ -78,13 +78,13 @@ impl Preview {
             targets: Vec::new(),
         };
         let scenes = scenes.start..scenes.end.min(scenes.start + SCENES);
-        let mut drawer = scene.drawer(engine)?;
-        let constants: Vec<(String, Vec<f32>)> = drawer
+        let mut session = scene.session(engine)?;
+        let constants: Vec<(String, Vec<f32>)> = session
             .constants()
             .into_iter()
             .map(|(array, bytes)| (array.name.clone(), bytemuck::pod_collect_to_vec(&bytes)))
             .collect();
-        drawer.draw(scenes, |window| {
+        session.draw(scenes, |window| {
             for number in 0..(window.scenes.end - window.scenes.start) as usize {
                 preview.add(scene, &Values { window: &window, constants: &constants, number });
             }
@@ -96,13 +96,13 @@ impl Preview {
     /// Adds a scene.
     fn add(&mut self, scene: &Scene, values: &Values) {
         let grid = scene.grid();
-        let groups = scene.outline(1).groups;
-        let of = |role: Role| {
+        let groups = scene.workload(1).groups;
+        let of = |role: GroupKind| {
             let names =
                 groups.iter().filter(move |group| group.role == role).map(|group| group.name.as_str());
             names.flat_map(|name| values.of(name).chunks_exact(grid.len())).collect::<Vec<_>>()
         };
-        let lights = of(Role::Illuminant);
+        let lights = of(GroupKind::Illuminant);
         let light: Vec<f64> = match lights.as_slice() {
             [] => colorimetry::d65(grid),
             lights => (0..grid.len()).map(|band| lights.iter().map(|l| f64::from(l[band])).sum()).collect(),
@@ -110,13 +110,13 @@ impl Preview {
         let Some(weights) = colorimetry::xyz_weights_under(&light, grid) else { return };
         let shone: Vec<_> = lights.iter().map(|light| xyz(light, &emitted(grid))).collect();
         let reflected = |role| of(role).into_iter().map(|s| xyz(s, &weights)).collect::<Vec<_>>();
-        let (surfaces, targets) = (reflected(Role::Surface), reflected(Role::Target));
+        let (surfaces, targets) = (reflected(GroupKind::Surface), reflected(GroupKind::Destination));
         if self.tiles.len() < TILES.0 * TILES.1 {
             // The lights of a scene keep their ratios.
             let brightest = shone.iter().map(|xyz| xyz[1]).fold(0.0, f64::max);
-            let known = |content: Content| {
+            let known = |quantity: Quantity| {
                 let arrays = groups.iter().flat_map(|group| &group.arrays);
-                let array = arrays.into_iter().find(|array| array.content == content)?;
+                let array = arrays.into_iter().find(|array| array.quantity == quantity)?;
                 let values = values.of(&array.name);
                 let least = values.iter().copied().reduce(f32::min)?;
                 Some([least, values.iter().copied().fold(least, f32::max)])
@@ -125,8 +125,8 @@ impl Preview {
                 lights: shone.iter().map(|xyz| colour(xyz.map(|v| 0.7 * v / brightest))).collect(),
                 chips: surfaces.iter().take(CHIPS.0 * CHIPS.1).map(|&xyz| colour(xyz)).collect(),
                 targets: targets.iter().map(|&xyz| colour(xyz)).collect(),
-                lrv: known(Content::Lrv),
-                intensity: known(Content::Intensity),
+                lrv: known(Quantity::Lrv),
+                intensity: known(Quantity::Intensity),
             });
         }
         let each = POINTS / SCENES as usize;

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressStyle};
-use spectroll::report::{Effort, Options, Report, ReportError, Verdict, figures, measure, page};
-use spectroll::{Choice, adapters};
+use spectroll::evaluation::report::{Effort, Options, Report, ReportError, Verdict, figures, measure, page};
+use spectroll::{EngineChoice, adapters};
 
 use super::{EngineArguments, Interrupted, Usage, check_interrupt, folder, model, watch_interrupts};
 
@@ -83,12 +83,12 @@ fn failures(Verdict { cases, checks, answers }: Verdict) -> String {
 }
 
 /// Every adapter and the CPU, unless one was asked for.
-fn engines(choice: Option<Choice>) -> Vec<Choice> {
+fn engines(choice: Option<EngineChoice>) -> Vec<EngineChoice> {
     match choice {
         Some(choice) => vec![choice],
         None => {
-            let adapters = (0..adapters().len()).map(|i| Choice::Adapter(i.to_string()));
-            [Choice::Cpu].into_iter().chain(adapters).collect()
+            let adapters = (0..adapters().len()).map(|i| EngineChoice::Adapter(i.to_string()));
+            [EngineChoice::Cpu].into_iter().chain(adapters).collect()
         }
     }
 }

@@ -5,11 +5,11 @@ use std::borrow::Cow;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use spectroll::export::provenance::{Sum, model_sum, shader_sum};
 use spectroll::output::{Field, Schema, SpdName};
-use spectroll::provenance::{Sum, model_sum, shader_sum};
 use spectroll::{
-    Batch, Bounds, DEFAULT_MAX_ATTEMPTS, Drawer, Element, Engine, EngineError, Intensity, Kind, Luminance,
-    Model, Proposal, Quantity, Recipe, RecipeError, Stream, colorimetry,
+    Batch, Bounds, DEFAULT_MAX_ATTEMPTS, Dtype, Engine, EngineError, Intensity, Model, ProposalKind,
+    Quantity, Recipe, RecipeError, Session, SpectrumKind, Stream, XyzScale, colorimetry,
 };
 
 /// What draws must obey, and what comes out of them.
@@ -87,7 +87,7 @@ enum QuantityName {
     /// Tristimulus values
     Xyz,
     /// Linear Rec. 709 components
-    Srgb,
+    LinearSrgb,
     /// The luminous reflectance
     Lrv,
     /// How many candidates each draw took
@@ -107,14 +107,14 @@ enum IntensityName {
 impl Request {
     /// The recipe of this for a model.
     pub(super) fn recipe(&self, model: &Model) -> Result<Recipe, RecipeError> {
-        let mut recipe = Recipe::new(model)
+        let mut recipe = Recipe::builder(model)
             .covariance_scale(self.cov_scale)
             .max_attempts(self.max_attempts)
             .quantities(self.quantities.iter().map(|quantity| quantity.meant()))
             .proposal(match self.proposal {
-                ProposalName::Auto => Proposal::Auto,
-                ProposalName::Plain => Proposal::Plain,
-                ProposalName::Cover => Proposal::Cover,
+                ProposalName::Auto => ProposalKind::Auto,
+                ProposalName::Plain => ProposalKind::Plain,
+                ProposalName::Cover => ProposalKind::Cover,
             });
         if let Some(lrv) = self.lrv {
             recipe = recipe.lrv(lrv).bounds(match self.bounds {
@@ -131,12 +131,12 @@ impl Request {
             });
         }
         if self.unit_luminance {
-            recipe = recipe.luminance(Luminance::One);
+            recipe = recipe.xyz_scale(XyzScale::UnitY);
         }
         match self.light {
             LightName::D65 => recipe,
-            LightName::A => recipe.light(&colorimetry::illuminant_a(model.grid())),
-            LightName::E => recipe.light(&vec![1.0; model.bands()]),
+            LightName::A => recipe.illuminant(&colorimetry::illuminant_a(model.grid())),
+            LightName::E => recipe.illuminant(&vec![1.0; model.bands()]),
         }
         .build()
     }
@@ -148,7 +148,7 @@ impl QuantityName {
             QuantityName::Spectra => Quantity::Spectra,
             QuantityName::Weights => Quantity::Weights,
             QuantityName::Xyz => Quantity::Xyz,
-            QuantityName::Srgb => Quantity::Srgb,
+            QuantityName::LinearSrgb => Quantity::LinearSrgb,
             QuantityName::Lrv => Quantity::Lrv,
             QuantityName::Attempts => Quantity::Attempts,
             QuantityName::Intensity => Quantity::Intensity,
@@ -167,15 +167,15 @@ fn intensity(text: &str) -> Result<IntensityName, String> {
 }
 
 /// What `count` draws of a recipe are as a data set, without what they were made from.
-pub(super) fn schema(recipe: &Recipe, count: u64, stored: Element) -> Schema {
-    let field = |format: spectroll::Format| {
+pub(super) fn schema(recipe: &Recipe, count: u64, stored: Dtype) -> Schema {
+    let field = |format: spectroll::ArrayFormat| {
         let axis = match format.quantity {
             Quantity::Spectra => {
                 let field = Field::vector("spectra", "wavelength", format.width, format.element);
                 return field.within(recipe.interval());
             }
             Quantity::Weights => "component",
-            Quantity::Xyz | Quantity::Srgb => "channel",
+            Quantity::Xyz | Quantity::LinearSrgb => "channel",
             Quantity::Lrv | Quantity::Attempts | Quantity::Intensity => {
                 return Field::scalar(format.quantity.name(), format.element);
             }
@@ -195,9 +195,12 @@ pub(super) fn schema(recipe: &Recipe, count: u64, stored: Element) -> Schema {
 /// The columns of a window, as [`schema`] has them: of tallies, the attempts.
 pub(super) fn columns<'a>(recipe: &Recipe, batch: &Batch<'a>) -> Vec<Cow<'a, [u8]>> {
     let column = |quantity| match quantity {
-        Quantity::Attempts => {
-            batch.tallies().iter().flat_map(|tally| tally.attempts().to_ne_bytes()).collect::<Vec<_>>().into()
-        }
+        Quantity::Attempts => batch
+            .statuses()
+            .iter()
+            .flat_map(|status| status.attempts().to_ne_bytes())
+            .collect::<Vec<_>>()
+            .into(),
         _ => Cow::Borrowed(batch.bytes(quantity)),
     };
     recipe.formats().iter().map(|format| column(format.quantity)).collect()
@@ -228,9 +231,9 @@ pub(super) fn attributes(
 }
 
 /// A sum that engines share exactly where they round alike: of draws that no data set holds.
-pub(super) fn rounding(recipe: &Recipe, drawer: &mut Drawer) -> Result<String, EngineError> {
+pub(super) fn rounding(recipe: &Recipe, session: &mut Session) -> Result<String, EngineError> {
     let mut sum = Sum::default();
-    drawer.draw(Stream::named(0, "rounding").draws(0..4096), |batch| {
+    session.draw(Stream::named(0, "rounding").draws(0..4096), |batch| {
         columns(recipe, &batch).iter().for_each(|column| sum.update(column));
         Ok::<_, EngineError>(())
     })?;
@@ -243,10 +246,10 @@ pub(super) fn engine_name(engine: &Engine) -> String {
 }
 
 /// How `.spd` files of such draws are called.
-pub(super) fn spd_name(request: &Request, kind: Kind) -> SpdName {
+pub(super) fn spd_name(request: &Request, kind: SpectrumKind) -> SpdName {
     match (kind, request.lrv) {
-        (Kind::Illuminant, _) => SpdName::Illuminant,
-        (Kind::Reflectance, None) => SpdName::Reflectance,
-        (Kind::Reflectance, Some(lrv)) => SpdName::ReflectanceAt(lrv),
+        (SpectrumKind::Illuminant, _) => SpdName::Illuminant,
+        (SpectrumKind::Reflectance, None) => SpdName::Reflectance,
+        (SpectrumKind::Reflectance, Some(lrv)) => SpdName::ReflectanceAt(lrv),
     }
 }

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use spectroll::output::{Outcome, Schema, SpdName};
+use spectroll::output::{Schema, SetStatus, SpdName};
 use spectroll::{Engine, EngineError};
 
 use super::progress::Progress;
-use super::sink::{OutputArguments, Sink, Target};
+use super::sink::{Destination, OutputArguments, Sink};
 use super::{check_interrupt, request, watch_interrupts};
 
 /// What takes the columns of some rows, and how many rows they are.
@@ -24,7 +24,7 @@ pub(super) trait Source {
 /// What is to be made, and where.
 pub(super) struct Run<'a> {
     pub(super) output: &'a OutputArguments,
-    pub(super) target: Target,
+    pub(super) target: Destination,
     pub(super) schema: Schema,
     /// How `.spd` files are called, and the number of the first row for that.
     pub(super) spd: (SpdName, u64),
@@ -43,7 +43,7 @@ pub(super) struct Open<'a> {
 impl<'a> Run<'a> {
     /// Opens the output. From here on Ctrl-C is for [`check_interrupt`] to see.
     pub(super) fn open(mut self, source: &mut dyn Source) -> anyhow::Result<Open<'a>> {
-        let is_set = matches!(self.target, Target::Set(_));
+        let is_set = matches!(self.target, Destination::Set(_));
         if is_set {
             self.schema.attributes.insert("rounding".to_owned(), source.rounding()?.into());
         }
@@ -62,7 +62,7 @@ impl<'a> Run<'a> {
 
 impl Open<'_> {
     /// Draws the rows that are missing, and completes the output.
-    pub(super) fn make(mut self, source: &mut dyn Source) -> anyhow::Result<Outcome> {
+    pub(super) fn make(mut self, source: &mut dyn Source) -> anyhow::Result<SetStatus> {
         match self.fill(source) {
             Ok(()) => self.sink.finish(),
             Err(error) => Err(self.stop(error)),

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use serde::Serialize;
-use spectroll::output::{Outcome, Schema};
-use spectroll::{Choice, Drawer, Draws, Engine, EngineError, Recipe, Stream, Summary};
+use spectroll::output::{Schema, SetStatus};
+use spectroll::{DrawRange, DrawSummary, Engine, EngineChoice, EngineError, Recipe, Session, Stream};
 
 use super::dry_run::DryRun;
 use super::request::{self, Request};
@@ -64,7 +64,7 @@ struct Report {
     stream: Option<String>,
     start: u64,
     #[serde(flatten)]
-    summary: Summary,
+    summary: DrawSummary,
     acceptance: Option<f64>,
     /// Whether the data set is there; not as long as other processes have parts of it to make.
     complete: bool,
@@ -84,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(name) => Stream::named(arguments.seed, name),
         None => Stream::new(arguments.seed),
     };
-    let draws = Draws { stream, first: arguments.start, count: arguments.count };
+    let draws = DrawRange { stream, first: arguments.start, count: arguments.count };
     let schema = schema(arguments, &recipe, draws);
     arguments.output.check(target, &schema)?;
 
@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return dry_run.print(arguments.json);
     }
     let why = match (&choice, engine.adapter()) {
-        (Choice::Auto, None) => ", no graphics hardware was found",
+        (EngineChoice::Auto, None) => ", no graphics hardware was found",
         _ => "",
     };
 
@@ -125,7 +125,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             start: arguments.start,
             summary,
             acceptance: summary.acceptance(),
-            complete: outcome == Outcome::Sealed,
+            complete: outcome == SetStatus::Sealed,
             seconds,
             draws_per_second: summary.draws as f64 / seconds,
             engine: format!("{engine}{why}"),
@@ -135,7 +135,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// What the data set is to hold, and what it is made from.
-fn schema(arguments: &Arguments, recipe: &Recipe, draws: Draws) -> Schema {
+fn schema(arguments: &Arguments, recipe: &Recipe, draws: DrawRange) -> Schema {
     // A folder on this machine is nobody else's business.
     let name = Path::new(&arguments.model).file_name().unwrap_or_default().to_string_lossy();
     let stream = (&arguments.stream, draws.stream);
@@ -148,27 +148,31 @@ fn schema(arguments: &Arguments, recipe: &Recipe, draws: Draws) -> Schema {
 /// Draws of a recipe as rows of a data set.
 pub(super) struct Rows<'a> {
     recipe: &'a Recipe,
-    drawer: Drawer<'a>,
-    draws: Draws,
+    session: Session<'a>,
+    draws: DrawRange,
     /// What those took that were drawn.
-    pub(super) summary: Summary,
+    pub(super) summary: DrawSummary,
 }
 
 impl<'a> Rows<'a> {
-    pub(super) fn new(recipe: &'a Recipe, engine: &'a Engine, draws: Draws) -> Result<Rows<'a>, EngineError> {
-        Ok(Rows { recipe, drawer: engine.drawer(recipe)?, draws, summary: Summary::default() })
+    pub(super) fn new(
+        recipe: &'a Recipe,
+        engine: &'a Engine,
+        draws: DrawRange,
+    ) -> Result<Rows<'a>, EngineError> {
+        Ok(Rows { recipe, session: engine.session(recipe)?, draws, summary: DrawSummary::default() })
     }
 }
 
 impl Source for Rows<'_> {
     fn rounding(&mut self) -> Result<String, EngineError> {
-        request::rounding(self.recipe, &mut self.drawer)
+        request::rounding(self.recipe, &mut self.session)
     }
 
     fn draw(&mut self, rows: Range<u64>, window: &mut Window) -> anyhow::Result<()> {
         let first = self.draws.first.wrapping_add(rows.start);
-        let draws = Draws { first, count: rows.end - rows.start, ..self.draws };
-        self.summary += self.drawer.draw(draws, |batch| {
+        let draws = DrawRange { first, count: rows.end - rows.start, ..self.draws };
+        self.summary += self.session.draw(draws, |batch| {
             let columns = request::columns(self.recipe, &batch);
             window(&columns.iter().map(|column| &**column).collect::<Vec<_>>(), batch.draws.count)
         })?;
@@ -176,11 +180,11 @@ impl Source for Rows<'_> {
     }
 }
 
-fn report(arguments: &Arguments, outcome: Outcome, made: &Report) -> anyhow::Result<()> {
+fn report(arguments: &Arguments, outcome: SetStatus, made: &Report) -> anyhow::Result<()> {
     if arguments.json {
         writeln!(io::stdout(), "{}", serde_json::to_string_pretty(made)?)?;
     } else if !arguments.quiet {
-        let Summary { draws, attempts, above_one } = made.summary;
+        let DrawSummary { draws, attempts, above_one } = made.summary;
         let accepted = made.acceptance.map_or(String::new(), |a| format!(" ({:.4} % accepted)", 100.0 * a));
         tell!("{}: {} spectra of {} bands", made.output, grouped(draws), made.bands);
         tell!("  {} candidates{accepted}", grouped(attempts));
@@ -193,7 +197,7 @@ fn report(arguments: &Arguments, outcome: Outcome, made: &Report) -> anyhow::Res
             _ => format!("{:.2} million a second, ", made.draws_per_second / 1e6),
         };
         tell!("  {:.2} s, {rate}{}", made.seconds, made.engine);
-        if let Outcome::Waiting { done, chunks } = outcome {
+        if let SetStatus::Waiting { done, chunks } = outcome {
             tell!(
                 "  {} of {} chunks are finished: the set gets its name with the last",
                 grouped(done),

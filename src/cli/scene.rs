@@ -8,16 +8,16 @@ use std::time::Instant;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use spectroll::Engine;
-use spectroll::output::{Outcome, Pending, Schema, SpdName};
-use spectroll::plot::Format;
-use spectroll::scene::{GroupSummary, Outline, PRESETS, Role, Scene};
+use spectroll::evaluation::plot::PictureFormat;
+use spectroll::output::{PendingFile, Schema, SetStatus, SpdName};
+use spectroll::scene::{GroupKind, GroupSummary, PRESETS, Scene, Workload};
 
 use super::dry_run::{free, room, size};
 use super::picture_file;
 use super::preview::Preview;
 use super::run::Run;
 use super::scene_rows::{self, Rows, Selection, element};
-use super::sink::{OutputArguments, Target};
+use super::sink::{Destination, OutputArguments};
 use super::{EngineArguments, Usage, existing, grouped};
 
 /// Draw scenes of lights, surfaces and targets, as a file says
@@ -66,7 +66,7 @@ struct Report {
     seed: u64,
     scenes: Range<u64>,
     #[serde(flatten)]
-    outline: Outline,
+    workload: Workload,
     drawn: Vec<GroupSummary>,
     complete: bool,
     seconds: f64,
@@ -145,7 +145,7 @@ struct Job<'a> {
 /// A picture that can be written.
 struct Picture<'a> {
     path: &'a Path,
-    format: Format,
+    format: PictureFormat,
 }
 
 impl Picture<'_> {
@@ -162,7 +162,7 @@ impl Job<'_> {
     }
 
     /// What is to be written and how, if that can be.
-    fn made(&self) -> anyhow::Result<(Target, Schema)> {
+    fn made(&self) -> anyhow::Result<(Destination, Schema)> {
         let output = &self.arguments.output;
         if self.arguments.json && output.to_stdout() {
             return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
@@ -179,7 +179,7 @@ impl Job<'_> {
     fn picture<'p>(&self, path: &'p Path) -> anyhow::Result<Picture<'p>> {
         let format = picture_file::format(path)?;
         if !self.arguments.dry_run {
-            Pending::create(path, existing(self.arguments.output.force))?;
+            PendingFile::create(path, existing(self.arguments.output.force))?;
         }
         Ok(Picture { path, format })
     }
@@ -187,15 +187,15 @@ impl Job<'_> {
     fn run(
         &self,
         engine: &Engine,
-        (target, mut schema): (Target, Schema),
+        (target, mut schema): (Destination, Schema),
         picture: Option<Picture>,
     ) -> anyhow::Result<()> {
         let start = Instant::now();
         let mut rows = Rows::new(self.scene, engine, &schema, self.scenes.start)?;
         schema.constants = rows.constants(&schema);
         let spd = match scene_rows::role(self.scene) {
-            Role::Illuminant => SpdName::Illuminant,
-            Role::Surface | Role::Target => SpdName::Reflectance,
+            GroupKind::Illuminant => SpdName::Illuminant,
+            GroupKind::Surface | GroupKind::Destination => SpdName::Reflectance,
         };
         let run = Run {
             output: &self.arguments.output,
@@ -218,16 +218,16 @@ impl Job<'_> {
         &self,
         engine: &Engine,
         drawn: Vec<GroupSummary>,
-        outcome: Outcome,
+        outcome: SetStatus,
         seconds: f64,
     ) -> anyhow::Result<()> {
         let report = Report {
             output: Some(self.arguments.output.output.display().to_string()),
             drawn,
-            complete: outcome == Outcome::Sealed,
+            complete: outcome == SetStatus::Sealed,
             seconds,
             scenes_per_second: self.count() as f64 / seconds,
-            ..self.outline(engine)
+            ..self.workload(engine)
         };
         if self.arguments.json {
             writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
@@ -244,7 +244,7 @@ impl Job<'_> {
                 }
             }
             tell!("  {seconds:.2} s, {}", report.engine);
-            if let Outcome::Waiting { done, chunks } = outcome {
+            if let SetStatus::Waiting { done, chunks } = outcome {
                 tell!("  {} of {} chunks are finished", grouped(done), grouped(chunks));
             }
         }
@@ -252,28 +252,28 @@ impl Job<'_> {
     }
 
     /// What drawing takes, before anything is drawn.
-    fn outline(&self, engine: &Engine) -> Report {
-        let mut outline = self.scene.outline(self.count());
-        if engine.adapter().is_none() && outline.shaders > 0 {
-            outline.left_out.push("the CPU draws, and nothing is compiled".to_owned());
-            outline.shaders = 0;
+    fn workload(&self, engine: &Engine) -> Report {
+        let mut workload = self.scene.workload(self.count());
+        if engine.adapter().is_none() && workload.shaders > 0 {
+            workload.left_out.push("the CPU draws, and nothing is compiled".to_owned());
+            workload.shaders = 0;
         }
-        for group in &mut outline.groups {
+        for group in &mut workload.groups {
             let all = group.arrays.len();
             group.arrays.retain(|array| self.arguments.selection.has(array));
             if group.arrays.len() < all {
-                outline.left_out.push(format!("{}: arrays that --arrays does not name", group.name));
+                workload.left_out.push(format!("{}: arrays that --arrays does not name", group.name));
             }
         }
-        let arrays = outline.groups.iter().flat_map(|group| &group.arrays);
-        outline.bytes = arrays.map(|a| a.bytes() as u64 * if a.per_scene { self.count() } else { 1 }).sum();
+        let arrays = workload.groups.iter().flat_map(|group| &group.arrays);
+        workload.bytes = arrays.map(|a| a.bytes() as u64 * if a.per_scene { self.count() } else { 1 }).sum();
         Report {
             scene: self.name.to_owned(),
             output: None,
             wavelengths: self.scene.grid().to_string(),
             seed: self.scene.seed(),
             scenes: self.scenes.clone(),
-            outline,
+            workload,
             drawn: Vec::new(),
             complete: false,
             seconds: 0.0,
@@ -284,18 +284,18 @@ impl Job<'_> {
     }
 
     fn dry_run(&self, engine: &Engine) -> anyhow::Result<()> {
-        let report = self.outline(engine);
+        let report = self.workload(engine);
         let mut out = io::stdout();
         if self.arguments.json {
             return Ok(writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?);
         }
-        let Report { scene, outline, engine, .. } = report;
+        let Report { scene, workload, engine, .. } = report;
         writeln!(out, "{scene}: {} scenes on {} nm", grouped(self.count()), self.scene.grid())?;
-        for group in &outline.groups {
+        for group in &workload.groups {
             let by = match (group.shader, group.draws_per_scene, group.draws_once) {
                 (_, 0, 0) => "nothing drawn".to_owned(),
                 (_, 0, once) => format!("{} drawn once, on the CPU", grouped(once)),
-                (Some(shader), each, _) if outline.shaders > 0 => {
+                (Some(shader), each, _) if workload.shaders > 0 => {
                     format!("{} a scene, by shader {shader}", grouped(each))
                 }
                 (_, each, _) => format!("{} a scene, on the CPU", grouped(each)),
@@ -308,10 +308,10 @@ impl Job<'_> {
             }
         }
         writeln!(out, "  left out:")?;
-        for line in &outline.left_out {
+        for line in &workload.left_out {
             writeln!(out, "    {line}")?;
         }
-        let shaders = match outline.shaders {
+        let shaders = match workload.shaders {
             0 => "no shader compiled".to_owned(),
             1 => "1 shader compiled".to_owned(),
             n => format!("{n} shaders compiled"),
@@ -319,12 +319,12 @@ impl Job<'_> {
         writeln!(
             out,
             "  {} spectra drawn by {engine}, {shaders}, {}",
-            grouped(outline.draws),
-            size(outline.bytes)
+            grouped(workload.draws),
+            size(workload.bytes)
         )?;
         let output = &self.arguments.output;
         if !output.to_stdout() && !output.output.as_os_str().is_empty() {
-            writeln!(out, "  {}", room(&output.output, outline.bytes, free(&output.output)))?;
+            writeln!(out, "  {}", room(&output.output, workload.bytes, free(&output.output)))?;
         }
         Ok(())
     }

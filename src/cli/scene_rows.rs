@@ -6,14 +6,14 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Map;
-use spectroll::output::{Constant, Field, Format, Layout, Schema};
-use spectroll::provenance::{Sum, model_sum};
-use spectroll::scene::{Array, Content, GroupSummary, Role, Scene, SceneDrawer};
-use spectroll::{Element, Engine, EngineError};
+use spectroll::export::provenance::{Sum, model_sum};
+use spectroll::output::{ChunkFormat, Field, FileFormat, Schema, SharedArray};
+use spectroll::scene::{Array, GroupKind, GroupSummary, Scene, SceneSession};
+use spectroll::{Dtype, Engine, EngineError};
 
 use super::Usage;
 use super::run::{Source, Window};
-use super::sink::Target;
+use super::sink::Destination;
 
 /// About how many spectra tell how an engine rounds, and in how many scenes at most.
 const ROUNDED: (u64, u64) = (4096, 64);
@@ -41,7 +41,7 @@ impl Selection {
         if let Some(name) = self.arrays.iter().find(|name| !known.contains(name)) {
             return Err(unknown("array", name, &known));
         }
-        let groups = scene.outline(1).groups;
+        let groups = scene.workload(1).groups;
         let wanted = |name: &str| {
             let group = groups.iter().find(|group| group.name == name);
             group.is_some_and(|group| group.arrays.iter().any(|array| self.has(array)))
@@ -69,13 +69,13 @@ pub(super) fn models(scene: &Scene) -> BTreeMap<String, String> {
 }
 
 /// Whether what all scenes share is kept once, rather than in every row, for want of any other place.
-pub(super) fn shares(target: Target) -> bool {
+pub(super) fn shares(target: Destination) -> bool {
     !matches!(
         target,
-        Target::Stdout
-            | Target::Spd
-            | Target::File(Format::Csv | Format::Parquet | Format::Npy)
-            | Target::Set(Layout::Parquet)
+        Destination::Stdout
+            | Destination::Spd
+            | Destination::File(FileFormat::Csv | FileFormat::Parquet | FileFormat::Npy)
+            | Destination::Set(ChunkFormat::Parquet)
     )
 }
 
@@ -83,7 +83,7 @@ pub(super) fn shares(target: Target) -> bool {
 pub(super) fn schema(
     scene: &Scene,
     selection: &Selection,
-    (target, stored): (Target, Element),
+    (target, stored): (Destination, Dtype),
     count: u64,
 ) -> Schema {
     let wanted = || scene.arrays().filter(|array| selection.has(array));
@@ -101,14 +101,14 @@ pub(super) fn schema(
 }
 
 /// What the spectra of a scene's first wanted group are, for the names of their files.
-pub(super) fn role(scene: &Scene) -> Role {
-    scene.outline(1).groups[0].role
+pub(super) fn role(scene: &Scene) -> GroupKind {
+    scene.workload(1).groups[0].role
 }
 
 /// Scenes that are drawn as rows of a data set.
 pub(super) struct Rows<'a> {
     scene: &'a Scene,
-    drawer: SceneDrawer<'a>,
+    session: SceneSession<'a>,
     /// The first scene of the data set.
     first: u64,
     /// The names of the columns.
@@ -126,24 +126,24 @@ impl<'a> Rows<'a> {
         schema: &Schema,
         first: u64,
     ) -> Result<Rows<'a>, EngineError> {
-        let drawer = scene.drawer(engine)?;
+        let session = scene.session(engine)?;
         let columns: Vec<String> = schema.fields.iter().map(|field| field.name.clone()).collect();
-        let constants = drawer.constants().into_iter();
+        let constants = session.constants().into_iter();
         let repeated = constants
             .filter(|(array, _)| columns.contains(&array.name))
             .map(|(array, bytes)| (array.name.clone(), bytes))
             .collect();
-        let drawn = drawer.taken_once();
-        Ok(Rows { scene, drawer, first, columns, repeated, drawn })
+        let drawn = session.taken_once();
+        Ok(Rows { scene, session, first, columns, repeated, drawn })
     }
 
     /// The constants of a schema, with their values.
-    pub(super) fn constants(&self, schema: &Schema) -> Vec<Constant> {
-        let drawn = self.drawer.constants();
+    pub(super) fn constants(&self, schema: &Schema) -> Vec<SharedArray> {
+        let drawn = self.session.constants();
         let bytes = |name: &str| drawn.iter().find(|(array, _)| array.name == name);
-        let filled = |constant: &Constant| {
+        let filled = |constant: &SharedArray| {
             let bytes = bytes(&constant.name).map_or_else(Vec::new, |(_, bytes)| bytes.clone());
-            Constant { bytes, ..constant.clone() }
+            SharedArray { bytes, ..constant.clone() }
         };
         schema.constants.iter().map(filled).collect()
     }
@@ -151,11 +151,11 @@ impl<'a> Rows<'a> {
 
 impl Source for Rows<'_> {
     fn rounding(&mut self) -> Result<String, EngineError> {
-        let outline = self.scene.outline(1);
-        let each: u64 = outline.groups.iter().map(|group| group.draws_per_scene).sum();
+        let workload = self.scene.workload(1);
+        let each: u64 = workload.groups.iter().map(|group| group.draws_per_scene).sum();
         let scenes = (ROUNDED.0 / each.max(1)).clamp(1, ROUNDED.1).min(self.scene.scenes());
         let mut sum = Sum::default();
-        self.drawer.draw(0..scenes, |window| {
+        self.session.draw(0..scenes, |window| {
             // Scene by scene, so that it does not matter how many windows there are.
             for scene in 0..window.scenes.end - window.scenes.start {
                 for (array, bytes) in window.arrays() {
@@ -171,7 +171,7 @@ impl Source for Rows<'_> {
     fn draw(&mut self, rows: Range<u64>, window: &mut Window) -> anyhow::Result<()> {
         let scenes = self.first + rows.start..self.first + rows.end;
         let (columns, repeated) = (&self.columns, &self.repeated);
-        let drawn = self.drawer.draw(scenes, |drawn| {
+        let drawn = self.session.draw(scenes, |drawn| {
             let count = drawn.scenes.end - drawn.scenes.start;
             let column = |name: &String| match repeated.iter().find(|(other, _)| other == name) {
                 Some((_, entry)) => Cow::Owned(entry.repeat(count as usize)),
@@ -188,25 +188,25 @@ impl Source for Rows<'_> {
 }
 
 /// The type of an array's values.
-pub(super) fn element(array: &Array) -> Element {
-    match array.content {
-        Content::Attempts => Element::U32,
-        _ => Element::F32,
+pub(super) fn element(array: &Array) -> Dtype {
+    match array.quantity {
+        Quantity::Attempts => Dtype::U32,
+        _ => Dtype::F32,
     }
 }
 
-fn constant(array: &Array) -> Constant {
+fn constant(array: &Array) -> SharedArray {
     let extents = array.shape.iter().map(|&extent| extent as u64);
     let axes = axes(array).into_iter().zip(extents).collect();
-    Constant { name: array.name.clone(), axes, element: element(array), bytes: Vec::new() }
+    SharedArray { name: array.name.clone(), axes, element: element(array), bytes: Vec::new() }
 }
 
 /// The names of the dimensions of an entry of an array.
 fn axes(array: &Array) -> Vec<String> {
     // Not that of the group alone: xarray takes a dimension of an array's name for its coordinates.
-    let group = array.name.strip_suffix(array.content.suffix()).unwrap_or(&array.name);
+    let group = array.name.strip_suffix(array.quantity.suffix()).unwrap_or(&array.name);
     let mut axes = Vec::new();
-    let inner = array.content.axis();
+    let inner = array.quantity.axis();
     if array.shape.len() > usize::from(inner.is_some()) {
         axes.push(format!("{group}_number"));
     }
@@ -215,7 +215,7 @@ fn axes(array: &Array) -> Vec<String> {
 }
 
 fn field(array: &Array) -> Field {
-    let inner = array.content.axis();
+    let inner = array.quantity.axis();
     let last = array.shape.last().copied().unwrap_or(1);
     let field = match inner {
         Some(axis) => Field::vector(&array.name, axis, last, element(array)),

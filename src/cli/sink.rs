@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use clap::builder::{OsStringValueParser, TypedValueParser};
-use spectroll::Element;
+use spectroll::Dtype;
 use spectroll::output::{
-    CsvWriter, FileWriter, Format, Layout, Outcome, OutputError, Plan, Schema, SetWriter, Shard, SpdFolder,
-    SpdName, Start,
+    ChunkFormat, CsvWriter, FileFormat, FileWriter, OutputError, Schema, SetMode, SetPlan, SetStatus,
+    SetWriter, Shard, SpdFolder, SpdName,
 };
 
 use super::shard::ShardName;
@@ -76,11 +76,11 @@ enum TypeName {
 
 /// What kind of thing is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Target {
+pub(super) enum Destination {
     Stdout,
-    File(Format),
+    File(FileFormat),
     Spd,
-    Set(Layout),
+    Set(ChunkFormat),
 }
 
 impl OutputArguments {
@@ -88,52 +88,52 @@ impl OutputArguments {
         self.output == Path::new("-")
     }
 
-    pub(super) fn element(&self) -> Element {
+    pub(super) fn element(&self) -> Dtype {
         match self.dtype {
-            TypeName::F16 => Element::F16,
-            TypeName::F32 => Element::F32,
-            TypeName::F64 => Element::F64,
+            TypeName::F16 => Dtype::F16,
+            TypeName::F32 => Dtype::F32,
+            TypeName::F64 => Dtype::F64,
         }
     }
 
     /// What the name and the flags mean together.
-    pub(super) fn target(&self) -> anyhow::Result<Target> {
+    pub(super) fn target(&self) -> anyhow::Result<Destination> {
         let usage = |text: &str| anyhow::Error::from(Usage(text.to_owned()));
         let format = self.format.map(|format| match format {
-            FormatName::Npy => Format::Npy,
-            FormatName::Npz => Format::Npz,
-            FormatName::Csv => Format::Csv,
-            FormatName::H5 => Format::Hdf5,
-            FormatName::Mat => Format::Mat,
-            FormatName::Parquet => Format::Parquet,
-            FormatName::Zarr => Format::Zarr,
-            FormatName::Spd => Format::Spd,
+            FormatName::Npy => FileFormat::Npy,
+            FormatName::Npz => FileFormat::Npz,
+            FormatName::Csv => FileFormat::Csv,
+            FormatName::H5 => FileFormat::Hdf5,
+            FormatName::Mat => FileFormat::Mat,
+            FormatName::Parquet => FileFormat::Parquet,
+            FormatName::Zarr => FileFormat::Zarr,
+            FormatName::Spd => FileFormat::Spd,
         });
         let is_folder =
             self.output.as_os_str().as_encoded_bytes().last().is_some_and(|&b| b == b'/' || b == b'\\');
         let target = match format {
-            Some(Format::Csv) | None if self.to_stdout() => Target::Stdout,
+            Some(FileFormat::Csv) | None if self.to_stdout() => Destination::Stdout,
             Some(_) if self.to_stdout() => {
                 return Err(usage("standard output takes CSV only: name a file, or drop --format"));
             }
-            _ => match format.map_or_else(|| Format::of(&self.output), Ok)? {
-                Format::Zarr => Target::Set(Layout::Zarr { zstd: self.zstd }),
-                Format::Spd => Target::Spd,
-                Format::Npy if is_folder => Target::Set(Layout::Npy),
-                Format::Parquet if is_folder => Target::Set(Layout::Parquet),
+            _ => match format.map_or_else(|| FileFormat::of(&self.output), Ok)? {
+                FileFormat::Zarr => Destination::Set(ChunkFormat::Zarr { zstd: self.zstd }),
+                FileFormat::Spd => Destination::Spd,
+                FileFormat::Npy if is_folder => Destination::Set(ChunkFormat::Npy),
+                FileFormat::Parquet if is_folder => Destination::Set(ChunkFormat::Parquet),
                 _ if is_folder => {
                     return Err(usage("a folder holds parts in --format npy or parquet, or spd files"));
                 }
-                file => Target::File(file),
+                file => Destination::File(file),
             },
         };
-        if self.zstd.is_some() && !matches!(target, Target::Set(Layout::Zarr { .. })) {
+        if self.zstd.is_some() && !matches!(target, Destination::Set(ChunkFormat::Zarr { .. })) {
             return Err(usage("--zstd is for .zarr"));
         }
         let of_sets =
             [("--chunk", self.chunk.is_some()), ("--shard", self.shard.is_some()), ("--resume", self.resume)];
         if let (false, Some((flag, _))) =
-            (matches!(target, Target::Set(_)), of_sets.iter().find(|(_, given)| *given))
+            (matches!(target, Destination::Set(_)), of_sets.iter().find(|(_, given)| *given))
         {
             return Err(usage(&format!(
                 "{flag} needs an output of many files: name it .zarr, or FOLDER/ with --format npy or parquet"
@@ -146,43 +146,44 @@ impl OutputArguments {
     }
 
     /// A set of chunks of these draws.
-    pub(super) fn plan(&self, layout: Layout, schema: &Schema) -> Plan {
-        let chunk = self.chunk.unwrap_or_else(|| Layout::default_chunk(schema.row_bytes(), schema.count));
-        Plan { layout, chunk, schema: schema.clone() }
+    pub(super) fn plan(&self, layout: ChunkFormat, schema: &Schema) -> SetPlan {
+        let chunk =
+            self.chunk.unwrap_or_else(|| ChunkFormat::default_chunk(schema.row_bytes(), schema.count));
+        SetPlan { layout, chunk, schema: schema.clone() }
     }
 
-    fn start(&self) -> Start {
+    fn start(&self) -> SetMode {
         match (self.resume, self.force) {
-            (true, _) => Start::Resume,
-            (_, true) => Start::Again,
-            _ => Start::New,
+            (true, _) => SetMode::Resume,
+            (_, true) => SetMode::Replace,
+            _ => SetMode::Create,
         }
     }
 
     /// Refuses what the target cannot hold.
-    pub(super) fn check(&self, target: Target, schema: &Schema) -> Result<(), OutputError> {
+    pub(super) fn check(&self, target: Destination, schema: &Schema) -> Result<(), OutputError> {
         match target {
-            Target::Stdout => Ok(()),
-            Target::File(format) => format.check(&self.output, schema),
-            Target::Spd => Format::Spd.check(&self.output, schema),
-            Target::Set(layout) => layout.check(&self.output, schema),
+            Destination::Stdout => Ok(()),
+            Destination::File(format) => format.check(&self.output, schema),
+            Destination::Spd => FileFormat::Spd.check(&self.output, schema),
+            Destination::Set(layout) => layout.check(&self.output, schema),
         }
     }
 
     /// Opens the target. `companions` are files that lie beside the chunks of a set, by name; `engine` draws.
     pub(super) fn open(
         &self,
-        target: Target,
+        target: Destination,
         schema: &Schema,
         (name, first): (SpdName, u64),
         (companions, engine): (&[(&str, &str)], &str),
     ) -> anyhow::Result<Sink> {
         let (path, existing) = (self.output.as_path(), existing(self.force));
         Ok(match target {
-            Target::Stdout => Sink::Stdout(CsvWriter::new(BufWriter::new(io::stdout()), schema)?),
-            Target::File(format) => Sink::File(FileWriter::create(path, format, schema, existing)?),
-            Target::Spd => Sink::Spd(SpdFolder::create(path, schema, name, first, existing)?),
-            Target::Set(layout) => {
+            Destination::Stdout => Sink::Stdout(CsvWriter::new(BufWriter::new(io::stdout()), schema)?),
+            Destination::File(format) => Sink::File(FileWriter::create(path, format, schema, existing)?),
+            Destination::Spd => Sink::Spd(SpdFolder::create(path, schema, name, first, existing)?),
+            Destination::Set(layout) => {
                 let shard = self.shard.map_or(Ok(Shard::WHOLE), ShardName::resolve)?;
                 let plan = self.plan(layout, schema);
                 let set = SetWriter::open(path, plan, companions, (shard, self.start()), engine)?;
@@ -219,14 +220,14 @@ impl Sink {
     }
 
     /// Completes what was written. An outcome other than `Sealed` is one of sets.
-    pub(super) fn finish(self) -> anyhow::Result<Outcome> {
+    pub(super) fn finish(self) -> anyhow::Result<SetStatus> {
         match self {
             Sink::Stdout(_) => {} // each window was flushed
             Sink::File(file) => file.finish()?,
             Sink::Spd(folder) => folder.finish()?,
             Sink::Set(set) => return Ok(set.finish()?),
         }
-        Ok(Outcome::Sealed)
+        Ok(SetStatus::Sealed)
     }
 
     /// Keeps what is finished after an error, and adds to it how to go on.

@@ -8,10 +8,10 @@ use anyhow::Context;
 use rand::Rng;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use spectroll::output::{Audit, Schema, merge};
-use spectroll::provenance::model_sum;
+use spectroll::export::provenance::model_sum;
+use spectroll::output::{Schema, SetAudit, merge};
 use spectroll::scene::Scene;
-use spectroll::{Choice, Draws, Engine, EngineError, Model, Recipe, Stream};
+use spectroll::{DrawRange, Engine, EngineChoice, EngineError, Model, Recipe, Stream};
 
 use super::request::Request;
 use super::run::Source;
@@ -54,7 +54,7 @@ pub(crate) fn join(arguments: &MergeArguments) -> anyhow::Result<()> {
 
 pub(crate) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
     watch_interrupts();
-    let audit = Audit::open(&arguments.path)?;
+    let audit = SetAudit::open(&arguments.path)?;
     let chunks = audit.chunks();
     let mut faults = Vec::new();
     for &chunk in &chunks {
@@ -101,7 +101,7 @@ fn share(text: &str) -> Result<f64, String> {
 
 /// What a set was made from.
 enum Made {
-    Draws { recipe: Box<Recipe>, draws: Draws },
+    Draws { recipe: Box<Recipe>, draws: DrawRange },
     Scenes { scene: Box<Scene>, first: u64 },
 }
 
@@ -126,7 +126,7 @@ impl Attributes<'_> {
 
 impl Made {
     /// What the set was made from, or why that is not at hand.
-    fn from(arguments: &VerifyArguments, audit: &Audit) -> anyhow::Result<Result<Made, String>> {
+    fn from(arguments: &VerifyArguments, audit: &SetAudit) -> anyhow::Result<Result<Made, String>> {
         let schema = &audit.plan().schema;
         let attributes = Attributes { path: &arguments.path, schema };
         match schema.attributes.contains_key("scene") {
@@ -148,7 +148,7 @@ impl Made {
             Some(name) => Stream::named(seed, &name),
             None => Stream::new(seed),
         };
-        Ok(Made::Draws { recipe, draws: Draws { stream, first: attributes.read("start")?, count } })
+        Ok(Made::Draws { recipe, draws: DrawRange { stream, first: attributes.read("start")?, count } })
     }
 
     /// A set has the text of its scene file, but not the files that this names.
@@ -187,7 +187,7 @@ impl Made {
     fn engine(&self, arguments: &VerifyArguments, schema: &Schema) -> anyhow::Result<Engine> {
         let rounding: String = Attributes { path: &arguments.path, schema }.read("rounding")?;
         let choice = arguments.engine.choice();
-        for choice in choice.map_or(vec![Choice::Auto, Choice::Cpu], |choice| vec![choice]) {
+        for choice in choice.map_or(vec![EngineChoice::Auto, EngineChoice::Cpu], |choice| vec![choice]) {
             let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
             if self.source(&engine, schema)?.rounding()? == rounding {
                 return Ok(engine);
@@ -204,7 +204,7 @@ impl Made {
     fn differences(
         &self,
         arguments: &VerifyArguments,
-        audit: &Audit,
+        audit: &SetAudit,
         chunks: &BTreeSet<u64>,
     ) -> anyhow::Result<Vec<String>> {
         let schema = &audit.plan().schema;

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use super::half_space::HalfSpace;
 use super::simplex::Polytope;
-use crate::program::Affine;
-use crate::region::HalfSpace;
+use crate::affine::Affine;
 
 /// How much the walls weigh beside the density: enough that the centre of a region with room in it stays clear of
 /// them, and little enough that it stays where the mass is.

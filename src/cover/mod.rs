@@ -3,23 +3,23 @@
 //! What a rule accepts is a polytope in the standard normals z. Where its probability p is small, plain rejection
 //! costs 1 / p candidates a draw. A cover proposes better ones: disjoint boxes that hold the whole polytope, in
 //! coordinates that suit it ([`Frame`]); one of them chosen by its probability ([`Alias`]), and in it a normal for
-//! each axis, truncated to the box ([`crate::truncated`]). What the rule then accepts is distributed exactly as the
+//! each axis, truncated to the box ([`crate::random::truncated`]). What the rule then accepts is distributed exactly as the
 //! accepted candidates of plain rejection are: both are the standard normal density on the polytope. Only the odds
 //! change, to p / (the probability of the boxes), a tenth or more for any p. Points beyond
-//! [`REACH`](crate::region::REACH) are left out.
+//! [`REACH`] are left out.
 //!
 //! The half-spaces are open and the boxes closed, but faces have no probability; what a box loses or gains by
 //! rounding to f32 is 1e-7 of it. A draw's physical test is the same as without a cover, on the same f32 spectrum.
 
 mod alias;
 mod frame;
+mod half_space;
 mod hat;
+mod mixture;
 mod partition;
-mod proposal;
 mod simplex;
 #[cfg(test)]
 pub(crate) mod tests;
-mod text;
 
 use alias::{Alias, odds};
 use hat::Axis;
@@ -29,11 +29,11 @@ use simplex::Polytope;
 use simplex::Sides;
 
 pub(crate) use frame::Frame;
-pub(crate) use proposal::Proposal;
+pub(crate) use half_space::{HalfSpace, REACH};
+pub(crate) use mixture::BoxMixture;
 
-use crate::region::HalfSpace;
 #[cfg(test)]
-use crate::stream::Stream;
+use crate::random::stream::Stream;
 
 /// The most boxes of a cover. Twice as many would accept a tenth more, of a table twice the size.
 const BOXES: usize = 1024;
@@ -54,7 +54,7 @@ pub(crate) struct Cover {
     #[cfg(test)]
     polytope: Polytope,
     boxes: Vec<Sides>,
-    proposal: Proposal<f64>,
+    proposal: BoxMixture<f64>,
     /// The mass of what is proposed, of which the region's is a share: the acceptance.
     mass: f64,
 }
@@ -99,7 +99,7 @@ impl Cover {
         let axes: Vec<Vec<Axis>> = boxes.iter().map(|sides| axes(sides, &frame)).collect();
         let masses: Vec<f64> = axes.iter().map(|axes| axes.iter().map(|a| a.mass).product()).collect();
         let (odds, excess, unit) = odds(&masses);
-        let proposal = Proposal {
+        let proposal = BoxMixture {
             alias: Alias::new(&odds),
             // Thinned by what rounding added to the odds, so that it costs acceptance and not exactness.
             costs: excess.iter().map(|e| 2.0 * e.ln()).collect(),
@@ -122,7 +122,7 @@ impl Cover {
     }
 
     /// What proposes candidates.
-    pub(crate) fn proposal(&self) -> &Proposal<f64> {
+    pub(crate) fn proposal(&self) -> &BoxMixture<f64> {
         &self.proposal
     }
 

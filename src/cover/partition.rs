@@ -2,9 +2,9 @@
 
 use std::collections::BinaryHeap;
 
+use super::half_space::REACH;
 use super::hat::normal_mass;
 use super::simplex::{Polytope, Reach, Sides, Simplex};
-use crate::region::REACH;
 
 /// Every side lies this far outside what it bounds, for rounding.
 const PADDING: f64 = 1e-11;

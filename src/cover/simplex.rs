@@ -315,7 +315,7 @@ mod tests {
     use rand::Rng;
 
     use super::*;
-    use crate::stream::Stream;
+    use crate::random::stream::Stream;
 
     /// What microlp finds: `None` where there is no point.
     fn by_microlp(polytope: &Polytope, sides: &Sides, objective: &[f64]) -> Option<f64> {

@@ -3,12 +3,13 @@
 use std::sync::LazyLock;
 
 use super::*;
+use crate::affine::Affine;
 use crate::colorimetry::lrv_weights;
 use crate::model::Model;
-use crate::program::{self, Affine, Bounds, Program, Target};
-use crate::real::Real;
-use crate::region::{Room, half_spaces, room};
-use crate::stream::StreamRng;
+use crate::program::feasibility::{Room, half_spaces, room};
+use crate::program::{self, Bounds, LrvTarget, Program};
+use crate::random::real::Real;
+use crate::random::stream::StreamRng;
 use rand::Rng;
 
 /// The probability of a false alarm, in each of some 50 comparisons.
@@ -18,7 +19,7 @@ static SURFACES: LazyLock<Model> = LazyLock::new(|| Model::builtin("munsell-vrhe
 
 fn program(lrv: Option<f64>, covariance_scale: f64) -> Program {
     let weights = lrv_weights(SURFACES.grid()).unwrap();
-    let target = lrv.map(|lrv| Target { lrv, weights, bounds: Bounds::Scaled });
+    let target = lrv.map(|lrv| LrvTarget { lrv, weights, bounds: Bounds::Scaled });
     Program {
         target,
         max_attempts: 1000,
@@ -124,7 +125,7 @@ fn single_precision_judges_as_double_does() {
 /// Points of a sample, in the coordinates of a cover.
 type Points = Vec<Vec<f64>>;
 
-fn accepted(cover: &Cover, proposal: &Proposal<f64>, candidates: u64) -> Points {
+fn accepted(cover: &Cover, proposal: &BoxMixture<f64>, candidates: u64) -> Points {
     let mut d = vec![[0.0]; proposal.components];
     let points = (0..candidates).filter_map(|i| {
         let [kept] = proposal.propose(&mut d, |block| Stream::new(4).block(i, 0, block));
@@ -237,7 +238,7 @@ fn a_cover_draws_what_a_markov_chain_draws() {
     let cover = near_white();
     let chain = chain(&cover, 20_000, 50);
     let agreement =
-        |proposal: &Proposal<f64>| agreement(&cover, &accepted(&cover, proposal, 1 << 18), &chain);
+        |proposal: &BoxMixture<f64>| agreement(&cover, &accepted(&cover, proposal, 1 << 18), &chain);
     let sound = agreement(cover.proposal());
     println!("sound: {sound:.2e}");
     assert!(sound > ALARM);

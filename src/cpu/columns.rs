@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::lanes::Done;
 use super::{Candidates, Kernel, Take, Value};
-use crate::program::Tally;
-use crate::quantity::{Element, Format, Interval, Layout};
-use crate::stream::Draws;
+use crate::draw_status::DrawStatus;
+use crate::quantity::{ArrayFormat, Dtype, Layout, ValueRange};
+use crate::random::stream::DrawRange;
 
 /// How many lanes the f32 engine has: a vector register of AVX-512, two of AVX2.
 const LANES: usize = 16;
@@ -20,14 +20,14 @@ const CHUNK: usize = 4096;
 
 /// The part of an array that some consecutive draws go into.
 struct Column<'a> {
-    format: Format,
+    format: ArrayFormat,
     /// That of each plane; of rows there is one. Words of 32 bits, whatever the values are.
     planes: Vec<&'a mut [u32]>,
 }
 
 /// Makes all of `draws` in f32, in order, on all cores. Each array has the words of one output, and is as long as
-/// [`Format::bytes`] says. Padding is left as it is.
-pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]) {
+/// [`ArrayFormat::bytes`] says. Padding is left as it is.
+pub(crate) fn fill(kernel: &Kernel<f32>, draws: DrawRange, arrays: &mut [&mut [u32]]) {
     let count = draws.count as usize;
     let size = (count / (4 * rayon::current_num_threads())).clamp(8 * LANES, CHUNK).next_multiple_of(4);
     let mut chunks: Vec<Vec<Column>> = (0..count.div_ceil(size)).map(|_| Vec::new()).collect();
@@ -43,8 +43,8 @@ pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]
 }
 
 /// The columns of each `size` draws, a multiple of 4.
-fn split(format: Format, words: &mut [u32], count: usize, size: usize) -> Vec<Column<'_>> {
-    let words_of = |values: usize| (values * format.element.size()).div_ceil(4);
+fn split(format: ArrayFormat, words: &mut [u32], count: usize, size: usize) -> Vec<Column<'_>> {
+    let words_of = |values: usize| (values * format.dtype.size()).div_ceil(4);
     let plane = words_of(format.values(count as u64) as usize / format.planes());
     let mut columns: Vec<_> =
         (0..count.div_ceil(size)).map(|_| Column { format, planes: Vec::new() }).collect();
@@ -61,12 +61,12 @@ fn split(format: Format, words: &mut [u32], count: usize, size: usize) -> Vec<Co
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx2+bmi2+fma",
     "x86_64+avx2+bmi2+fma"
 ))]
-fn fill_chunk(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
+fn fill_chunk(kernel: &Kernel<f32>, draws: DrawRange, columns: Vec<Column>) {
     fill_in_lanes::<LANES>(kernel, draws, columns);
 }
 
 #[inline(always)]
-fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
+fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: DrawRange, columns: Vec<Column>) {
     let widest = kernel.outputs.iter().map(|output| output.format.width).max().unwrap_or(0);
     let row = vec![0.0; widest.next_multiple_of(8)];
     let halves = vec![f16::ZERO; row.len()];
@@ -86,16 +86,16 @@ impl<const L: usize> Take<f32, L> for Filling<'_> {
     #[inline(always)]
     fn take(&mut self, done: &[Done], candidates: &Candidates<f32, L>) {
         for (number, (output, column)) in self.kernel.outputs.iter().zip(&mut self.columns).enumerate() {
-            if let Value::Tally = output.value {
+            if let Value::Status = output.value {
                 for done in done {
-                    column.planes[0][done.number] = bytemuck::cast(done.tally);
+                    column.planes[0][done.number] = bytemuck::cast(done.status);
                 }
                 continue;
             }
             let (values, unit) = candidates.output(number, &output.value);
             let values = &values[..output.format.width];
-            match output.format.element {
-                Element::F16 => {
+            match output.format.dtype {
+                Dtype::F16 => {
                     let (row, halves) = (&mut self.row, &mut self.halves);
                     column.put_halves(values, &unit, done, self.kernel.interval, row, halves);
                 }
@@ -131,7 +131,7 @@ impl Column<'_> {
         values: &[[f32; L]],
         unit: &[f32; L],
         done: &[Done],
-        interval: Interval,
+        interval: ValueRange,
         row: &mut [f32],
         halves: &mut [f16],
     ) {
@@ -140,7 +140,7 @@ impl Column<'_> {
         let eights = width.next_multiple_of(8);
         for done in done {
             copy(values, unit, done, &mut row[..width]);
-            if done.tally != Tally::FAILED {
+            if done.status != DrawStatus::FAILED {
                 row[..width].iter_mut().for_each(|value| *value = value.clamp(least, largest));
             }
             halves[..eights].convert_from_f32_slice(&row[..eights]);
@@ -164,7 +164,7 @@ impl Column<'_> {
 /// times the cost of plain loads.
 #[inline(never)]
 fn copy<const L: usize>(values: &[[f32; L]], unit: &[f32; L], done: &Done, row: &mut [f32]) {
-    if done.tally == Tally::FAILED {
+    if done.status == DrawStatus::FAILED {
         return row.fill(0.0);
     }
     let lane = done.lane;
@@ -185,22 +185,22 @@ mod tests {
     use crate::model::Model;
     use crate::program::Bounds;
     use crate::quantity::Quantity;
+    use crate::random::stream::Stream;
     use crate::recipe::{Intensity, Recipe, RecipeBuilder};
-    use crate::stream::Stream;
 
     /// Recipes of every kind, some of whose draws fail.
     fn recipes() -> Vec<(Recipe, u32)> {
         let [surface, light] = ["munsell-vrhel", "granada"].map(|name| Model::builtin(name).unwrap());
-        let surface = || Recipe::new(&surface);
+        let surface = || Recipe::builder(&surface);
         let all_but = |builder: RecipeBuilder, quantity| {
             builder.quantities(Quantity::ALL.into_iter().filter(|q| *q != quantity))
         };
         let lit = |builder| all_but(builder, Quantity::Intensity);
         let recipe = |builder: RecipeBuilder, max_attempts| (builder.build().unwrap(), max_attempts);
         vec![
-            recipe(Recipe::new(&light), 100),
+            recipe(Recipe::builder(&light), 100),
             recipe(
-                all_but(Recipe::new(&light).intensity(Intensity::LogUniform(0.15, 150.0)), Quantity::Lrv),
+                all_but(Recipe::builder(&light).intensity(Intensity::LogUniform(0.15, 150.0)), Quantity::Lrv),
                 100,
             ),
             recipe(surface(), 100),
@@ -216,16 +216,16 @@ mod tests {
     }
 
     fn kernel(recipe: &(Recipe, u32)) -> Kernel<f32> {
-        let program = recipe.0.program().tallied();
+        let program = recipe.0.program().with_status();
         Kernel::new(&crate::program::Program { max_attempts: recipe.1, ..program })
     }
 
     fn arrays(kernel: &Kernel<f32>, count: u64) -> Vec<Vec<u32>> {
-        let words = |format: Format| vec![0; format.bytes(count).div_ceil(4) as usize];
+        let words = |format: ArrayFormat| vec![0; format.bytes(count).div_ceil(4) as usize];
         kernel.outputs.iter().map(|output| words(output.format)).collect()
     }
 
-    fn in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws) -> Vec<Vec<u32>> {
+    fn in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: DrawRange) -> Vec<Vec<u32>> {
         let mut arrays = arrays(kernel, draws.count);
         let count = draws.count as usize;
         let all = count.next_multiple_of(4).max(4);
@@ -275,20 +275,20 @@ mod tests {
             let count = 37;
             let arrays = in_lanes::<16>(&kernel, Stream::new(3).draws(0..count));
             for i in 0..count {
-                let (values, tally) = kernel.draw(Stream::new(3), i);
+                let (values, status) = kernel.draw(Stream::new(3), i);
                 for ((output, values), words) in kernel.outputs.iter().zip(values).zip(&arrays) {
                     let format = output.format;
                     let at = |j: usize| match format.layout {
                         Layout::Planes => j * count.next_multiple_of(4) as usize + i as usize,
                         _ => i as usize * format.stride() + j,
                     };
-                    match format.element {
-                        Element::U32 => assert_eq!(bytemuck::cast::<_, Tally>(words[i as usize]), tally),
-                        Element::F64 => unreachable!("draws are not in f64"),
-                        Element::F32 => {
+                    match format.dtype {
+                        Dtype::U32 => assert_eq!(bytemuck::cast::<_, DrawStatus>(words[i as usize]), status),
+                        Dtype::F64 => unreachable!("draws are not in f64"),
+                        Dtype::F32 => {
                             (0..format.width).for_each(|j| assert_eq!(words[at(j)], values[j].to_bits()))
                         }
-                        Element::F16 => {
+                        Dtype::F16 => {
                             let halves: &[f16] = bytemuck::cast_slice(words);
                             let [least, largest] = kernel.interval.halves();
                             for j in 0..format.width {

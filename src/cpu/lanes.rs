@@ -1,8 +1,8 @@
 //! Which draw each lane works on, and which draws are done.
 
 use super::Verdicts;
-use crate::program::Tally;
-use crate::stream::{Attempts, Draws};
+use crate::draw_status::DrawStatus;
+use crate::random::stream::{Attempts, DrawRange};
 
 /// A draw that is done, and the lane of the candidates that it is in. Where it failed they are those of its last
 /// attempt.
@@ -11,12 +11,12 @@ pub(super) struct Done {
     /// Its number, from the first that was asked for on.
     pub(super) number: usize,
     pub(super) lane: usize,
-    pub(super) tally: Tally,
+    pub(super) status: DrawStatus,
 }
 
 /// Lanes that share the work on some draws: one that is done takes the next.
 pub(super) struct Lanes<const L: usize> {
-    draws: Draws,
+    draws: DrawRange,
     /// The number of each lane's draw, from the first on.
     numbers: [u64; L],
     /// Its index, low words and high ones.
@@ -32,7 +32,7 @@ pub(super) struct Lanes<const L: usize> {
 
 impl<const L: usize> Lanes<L> {
     #[inline(always)]
-    pub(super) fn new(draws: Draws) -> Self {
+    pub(super) fn new(draws: DrawRange) -> Self {
         const { assert!(0 < L && L <= 64, "a lane is a bit of a word") };
         let mut lanes = Lanes {
             draws,
@@ -41,7 +41,7 @@ impl<const L: usize> Lanes<L> {
             attempts: [0; L],
             next: 0,
             busy: u64::MAX >> (64 - L),
-            done: [Done { number: 0, lane: 0, tally: Tally::FAILED }; L],
+            done: [Done { number: 0, lane: 0, status: DrawStatus::FAILED }; L],
         };
         for lane in 0..L {
             lanes.take_next(lane);
@@ -75,11 +75,11 @@ impl<const L: usize> Lanes<L> {
         while ended != 0 {
             let lane = ended.trailing_zeros() as usize;
             ended &= ended - 1;
-            let tally = match verdicts.accepted[lane] {
-                true => Tally::accepted(self.attempts[lane], verdicts.above_one[lane]),
-                false => Tally::FAILED,
+            let status = match verdicts.accepted[lane] {
+                true => DrawStatus::accepted(self.attempts[lane], verdicts.above_one[lane]),
+                false => DrawStatus::FAILED,
             };
-            self.done[count] = Done { number: self.numbers[lane] as usize, lane, tally };
+            self.done[count] = Done { number: self.numbers[lane] as usize, lane, status };
             count += 1;
             self.take_next(lane);
         }

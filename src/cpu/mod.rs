@@ -12,33 +12,35 @@
 #![allow(clippy::needless_range_loop)] // a lane is an index, of several arrays at once
 
 mod columns;
+mod intensity;
 mod lanes;
 
 pub(crate) use columns::fill;
 
 use lanes::{Done, Lanes};
 
-use crate::cover::Proposal;
-use crate::dataset::Kind;
-use crate::level::{self, Level};
-use crate::program::{self, Affine, Program, Source, Tally};
-use crate::quantity::{Format, Interval};
-use crate::real::Real;
-use crate::stream::{Attempts, Blocks, Draws, Stream};
+use crate::affine::Affine;
+use crate::cover::BoxMixture;
+use crate::dataset::SpectrumKind;
+use crate::draw_status::DrawStatus;
+use crate::program::{self, IntensityLaw, Program, Source};
+use crate::quantity::{ArrayFormat, ValueRange};
+use crate::random::real::Real;
+use crate::random::stream::{self, Attempts, Blocks, DrawRange, Stream};
 
 /// A [`Program`] with its numbers rounded to `R`.
 pub(crate) struct Kernel<R> {
     spectrum: Map<R>,
-    target: Option<Target<R>>,
-    level: Option<Level<R>>,
-    proposal: Option<Proposal<R>>,
+    target: Option<LrvTarget<R>>,
+    intensity: Option<IntensityLaw<R>>,
+    proposal: Option<BoxMixture<R>>,
     /// What a physical value is below, before scaling.
     limit: R,
     tests_scaled: bool,
     may_exceed_one: bool,
     max_attempts: u32,
     /// What the values of spectra are between.
-    interval: Interval,
+    interval: ValueRange,
     outputs: Vec<Output<R>>,
 }
 
@@ -51,13 +53,13 @@ struct Map<R> {
     components: usize,
 }
 
-struct Target<R> {
+struct LrvTarget<R> {
     lrv: R,
     weights: Vec<R>,
 }
 
 struct Output<R> {
-    format: Format,
+    format: ArrayFormat,
     value: Value<R>,
 }
 
@@ -65,8 +67,8 @@ struct Output<R> {
 enum Value<R> {
     Spectrum,
     Map(Map<R>, Unit<R>),
-    Level,
-    Tally,
+    Intensity,
+    Status,
 }
 
 /// A [`program::Unit`].
@@ -100,8 +102,8 @@ impl<R: Real, const L: usize> Candidates<R, L> {
         match value {
             Value::Spectrum => (&self.spectrum, self.scale),
             Value::Map(..) => (&self.maps[number].values, self.maps[number].unit),
-            Value::Level => (std::slice::from_ref(&self.scale), [R::ONE; L]),
-            Value::Tally => (&[], [R::ONE; L]),
+            Value::Intensity => (std::slice::from_ref(&self.scale), [R::ONE; L]),
+            Value::Status => (&[], [R::ONE; L]),
         }
     }
 }
@@ -128,12 +130,12 @@ impl<R: Real> Kernel<R> {
                 Source::Map(map, program::Unit::Over(over)) => {
                     Value::Map(Map::new(map), Unit::Over(Map::new(over)))
                 }
-                Source::Level => Value::Level,
-                Source::Tally => Value::Tally,
+                Source::Intensity => Value::Intensity,
+                Source::Status => Value::Status,
             },
         };
         let limit = match program.kind {
-            Kind::Reflectance if program.tests_base() => R::ONE,
+            SpectrumKind::Reflectance if program.tests_base() => R::ONE,
             _ => R::INFINITY,
         };
         Kernel {
@@ -141,9 +143,9 @@ impl<R: Real> Kernel<R> {
             target: program
                 .target
                 .as_ref()
-                .map(|t| Target { lrv: R::from_f64(t.lrv), weights: round(&t.weights) }),
-            level: program.level.as_ref().map(Level::new),
-            proposal: program.proposal.as_ref().map(Proposal::rounded),
+                .map(|t| LrvTarget { lrv: R::from_f64(t.lrv), weights: round(&t.weights) }),
+            intensity: program.intensity.as_ref().map(IntensityLaw::rounded),
+            proposal: program.proposal.as_ref().map(BoxMixture::rounded),
             limit,
             tests_scaled: program.tests_scaled(),
             may_exceed_one: program.may_exceed_one(),
@@ -160,15 +162,15 @@ impl<R: Real> Kernel<R> {
     }
 
     /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
-    pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, Tally) {
-        struct Only<'a, R>(&'a Kernel<R>, Option<(Vec<Vec<R>>, Tally)>);
+    pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, DrawStatus) {
+        struct Only<'a, R>(&'a Kernel<R>, Option<(Vec<Vec<R>>, DrawStatus)>);
         impl<R: Real> Take<R, 1> for Only<'_, R> {
             fn take(&mut self, done: &[Done], candidates: &Candidates<R, 1>) {
-                self.1 = done.first().map(|done| (self.0.values(candidates, done.tally), done.tally));
+                self.1 = done.first().map(|done| (self.0.values(candidates, done.status), done.status));
             }
         }
         let mut only = Only(self, None);
-        self.in_lanes(Draws { stream, first: index, count: 1 }, &mut only);
+        self.in_lanes(DrawRange { stream, first: index, count: 1 }, &mut only);
         only.1.expect("one draw was asked for")
     }
 
@@ -178,13 +180,13 @@ impl<R: Real> Kernel<R> {
         &self,
         attempt: u32,
         mut block: impl FnMut(u32) -> [u32; 4],
-    ) -> Option<(Vec<Vec<R>>, Tally)> {
+    ) -> Option<(Vec<Vec<R>>, DrawStatus)> {
         let mut candidates = self.candidates::<1>();
         let kept = self.propose(&mut candidates, &mut block);
-        let word = self.level.as_ref().map(|_| [block(level::BLOCK)[0]]);
+        let word = self.intensity.as_ref().map(|_| [block(stream::DRAW_BLOCK)[0]]);
         let verdicts = self.judge(&mut candidates, kept, word);
-        let tally = Tally::accepted(attempt, verdicts.above_one[0]);
-        verdicts.accepted[0].then(|| (self.values(&candidates, tally), tally))
+        let status = DrawStatus::accepted(attempt, verdicts.above_one[0]);
+        verdicts.accepted[0].then(|| (self.values(&candidates, status), status))
     }
 
     /// Whether the candidate of those words is accepted.
@@ -192,12 +194,12 @@ impl<R: Real> Kernel<R> {
         self.candidate(1, block).is_some()
     }
 
-    fn values(&self, candidates: &Candidates<R, 1>, tally: Tally) -> Vec<Vec<R>> {
+    fn values(&self, candidates: &Candidates<R, 1>, status: DrawStatus) -> Vec<Vec<R>> {
         let values = self.outputs.iter().enumerate().map(|(number, output)| {
             let (values, [unit]) = candidates.output(number, &output.value);
             let width = values.len().min(output.format.width);
-            match tally {
-                Tally::FAILED => vec![R::ZERO; width],
+            match status {
+                DrawStatus::FAILED => vec![R::ZERO; width],
                 _ => values[..width].iter().map(|&[value]| value * unit).collect(),
             }
         });
@@ -206,14 +208,14 @@ impl<R: Real> Kernel<R> {
 
     /// Makes all of `draws`, each of which goes to `to` when it is done.
     #[inline(always)]
-    fn in_lanes<const L: usize>(&self, draws: Draws, to: &mut impl Take<R, L>) {
+    fn in_lanes<const L: usize>(&self, draws: DrawRange, to: &mut impl Take<R, L>) {
         let mut candidates = self.candidates::<L>();
         let mut lanes = Lanes::new(draws);
         while lanes.are_busy() {
             let words = lanes.words();
             let kept = self.propose(&mut candidates, words);
-            let word = if self.level.is_some() {
-                Some(Attempts { attempts: [0; L], ..words }.block(level::BLOCK)[0])
+            let word = if self.intensity.is_some() {
+                Some(Attempts { attempts: [0; L], ..words }.block(stream::DRAW_BLOCK)[0])
             } else {
                 None
             };
@@ -271,7 +273,7 @@ impl<R: Real> Kernel<R> {
                 verdicts.accepted[l] &= !self.tests_scaled || peak < R::ONE;
                 verdicts.above_one[l] = self.may_exceed_one && peak >= R::ONE;
             }
-        } else if let Some((level, word)) = self.level.as_ref().zip(word) {
+        } else if let Some((level, word)) = self.intensity.as_ref().zip(word) {
             for l in 0..L {
                 candidates.scale[l] = level.of(word[l]);
             }
@@ -331,7 +333,7 @@ impl<R: Real> Map<R> {
     }
 }
 
-impl<R: Real> Target<R> {
+impl<R: Real> LrvTarget<R> {
     /// What scales spectra to the target.
     #[inline(always)]
     fn factor<const L: usize>(&self, spectrum: &[[R; L]]) -> [R; L] {

@@ -6,7 +6,7 @@ use super::{Table, mat};
 
 /// A table that is compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Builtin {
+pub enum BuiltinTable {
     /// 462 Munsell papers measured by Nickerson: reflectance, 400 to 700 nm by 5 nm.
     Munsell,
     /// 170 natural and man-made surfaces measured by Vrhel, Gershon & Iwan (1994): reflectance, 390 to 730 nm by 2
@@ -20,41 +20,46 @@ pub enum Builtin {
     CieDaylight,
 }
 
-impl Builtin {
+impl BuiltinTable {
     /// Every table.
-    pub const ALL: [Builtin; 5] =
-        [Builtin::Munsell, Builtin::Vrhel, Builtin::D65, Builtin::Xyz1931, Builtin::CieDaylight];
+    pub const ALL: [BuiltinTable; 5] = [
+        BuiltinTable::Munsell,
+        BuiltinTable::Vrhel,
+        BuiltinTable::D65,
+        BuiltinTable::Xyz1931,
+        BuiltinTable::CieDaylight,
+    ];
 
     /// The table of that [name](Self::name).
-    pub fn named(name: &str) -> Option<Builtin> {
-        Builtin::ALL.into_iter().find(|builtin| builtin.name() == name)
+    pub fn named(name: &str) -> Option<BuiltinTable> {
+        BuiltinTable::ALL.into_iter().find(|builtin| builtin.name() == name)
     }
 
     /// What the table is called here.
     pub fn name(self) -> &'static str {
         match self {
-            Builtin::Munsell => "munsell",
-            Builtin::Vrhel => "vrhel",
-            Builtin::D65 => "d65",
-            Builtin::Xyz1931 => "xyz1931",
-            Builtin::CieDaylight => "cie-daylight",
+            BuiltinTable::Munsell => "munsell",
+            BuiltinTable::Vrhel => "vrhel",
+            BuiltinTable::D65 => "d65",
+            BuiltinTable::Xyz1931 => "xyz1931",
+            BuiltinTable::CieDaylight => "cie-daylight",
         }
     }
 
     /// The table itself, at its native sampling.
     pub fn table(self) -> Table {
         let (variable, bytes): (_, &[u8]) = match self {
-            Builtin::Munsell => ("sur_nickerson", include_bytes!("../../data/sur_nickerson.mat")),
-            Builtin::Vrhel => ("sur_vrhel", include_bytes!("../../data/sur_vrhel.mat")),
-            Builtin::D65 => ("spd_D65", include_bytes!("../../data/spd_D65.mat")),
-            Builtin::Xyz1931 => ("T_xyz1931", include_bytes!("../../data/T_xyz1931.mat")),
-            Builtin::CieDaylight => ("B_cieday", include_bytes!("../../data/B_cieday.mat")),
+            BuiltinTable::Munsell => ("sur_nickerson", include_bytes!("../../data/sur_nickerson.mat")),
+            BuiltinTable::Vrhel => ("sur_vrhel", include_bytes!("../../data/sur_vrhel.mat")),
+            BuiltinTable::D65 => ("spd_D65", include_bytes!("../../data/spd_D65.mat")),
+            BuiltinTable::Xyz1931 => ("T_xyz1931", include_bytes!("../../data/T_xyz1931.mat")),
+            BuiltinTable::CieDaylight => ("B_cieday", include_bytes!("../../data/B_cieday.mat")),
         };
         let mut table = mat::read(Path::new(self.name()), bytes, Some(variable))
             .expect("compiled-in tables are readable");
         table.name = self.name().to_owned();
         table.source = table.name.clone();
-        if self == Builtin::Munsell {
+        if self == BuiltinTable::Munsell {
             // The file runs from 380 to 780 nm, but was padded with zeros where nothing was measured.
             table.crop(400.0, 700.0);
         }
@@ -74,18 +79,18 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Kind;
+    use crate::dataset::SpectrumKind;
 
     #[test]
     fn every_table_has_its_shape_range_and_kind() {
         for (name, count, first, last, bands, kind) in [
-            ("munsell", 462, 400.0, 700.0, 61, Some(Kind::Reflectance)),
-            ("vrhel", 170, 390.0, 730.0, 171, Some(Kind::Reflectance)),
-            ("d65", 1, 380.0, 780.0, 81, Some(Kind::Illuminant)),
+            ("munsell", 462, 400.0, 700.0, 61, Some(SpectrumKind::Reflectance)),
+            ("vrhel", 170, 390.0, 730.0, 171, Some(SpectrumKind::Reflectance)),
+            ("d65", 1, 380.0, 780.0, 81, Some(SpectrumKind::Illuminant)),
             ("xyz1931", 3, 360.0, 830.0, 471, None),
             ("cie-daylight", 3, 380.0, 780.0, 81, None),
         ] {
-            let table = Builtin::named(name).unwrap().table();
+            let table = BuiltinTable::named(name).unwrap().table();
             let wavelengths = table.wavelengths();
             assert_eq!((table.len(), wavelengths.len(), table.kind()), (count, bands, kind), "{name}");
             assert_eq!((wavelengths[0], wavelengths[bands - 1]), (first, last), "{name}");
@@ -95,13 +100,13 @@ mod tests {
     /// Values that stand in the published tables.
     #[test]
     fn known_values() {
-        let at = |b: Builtin, spectrum: usize, nm: f64| {
+        let at = |b: BuiltinTable, spectrum: usize, nm: f64| {
             let table = b.table();
             let band = table.wavelengths().iter().position(|&w| w == nm).unwrap();
             table.spectrum(spectrum)[band]
         };
-        assert_eq!(at(Builtin::D65, 0, 560.0), 100.0);
-        assert_eq!(at(Builtin::Xyz1931, 1, 555.0), 1.0);
-        assert_eq!(at(Builtin::CieDaylight, 0, 560.0), 100.0);
+        assert_eq!(at(BuiltinTable::D65, 0, 560.0), 100.0);
+        assert_eq!(at(BuiltinTable::Xyz1931, 1, 555.0), 1.0);
+        assert_eq!(at(BuiltinTable::CieDaylight, 0, 560.0), 100.0);
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use rust_hdf5::{H5File, Hdf5Error};
 
-use super::mat::Matrix;
+use super::matrix::Matrix;
 use super::{DatasetError, MAX_BYTES};
 
 pub(super) fn matrices(path: &Path) -> Result<Vec<Matrix>, DatasetError> {

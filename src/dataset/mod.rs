@@ -8,6 +8,7 @@ mod csv;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 mod mat;
+mod matrix;
 mod npy;
 
 use std::fmt;
@@ -17,8 +18,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{self, Extend, Grid, GridError, Spline};
-pub use builtin::Builtin;
+use crate::grid::{self, Extrapolation, Grid, GridError, Spline};
+pub use builtin::BuiltinTable;
 
 /// The most that is read of a file, and that a compressed file may unpack to: 512 MiB, 67 million values.
 const MAX_BYTES: u64 = 512 << 20;
@@ -26,18 +27,18 @@ const MAX_BYTES: u64 = 512 << 20;
 /// What spectra describe, and so what makes one of them physical.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum SpectrumKind {
     /// Spectral power distributions of lights: positive in every band, of any magnitude.
     Illuminant,
     /// Diffuse reflectances of surfaces: between 0 and 1 in every band.
     Reflectance,
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for SpectrumKind {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self {
-            Kind::Illuminant => "illuminant",
-            Kind::Reflectance => "reflectance",
+            SpectrumKind::Illuminant => "illuminant",
+            SpectrumKind::Reflectance => "reflectance",
         })
     }
 }
@@ -99,7 +100,7 @@ pub struct Table {
     wavelengths: Vec<f64>,
     /// A column a spectrum.
     spectra: DMatrix<f64>,
-    kind: Option<Kind>,
+    kind: Option<SpectrumKind>,
 }
 
 impl Table {
@@ -169,7 +170,7 @@ impl Table {
 
     /// What the field's naming convention says the spectra are: `sur_x` reflectances, `spd_x` and `daylightX`
     /// illuminants.
-    pub fn kind(&self) -> Option<Kind> {
+    pub fn kind(&self) -> Option<SpectrumKind> {
         self.kind
     }
 
@@ -190,9 +191,9 @@ impl Table {
         &self.spectra.as_slice()[index * bands..(index + 1) * bands]
     }
 
-    fn resample(&self, grid: Grid, extend: Extend) -> Result<DMatrix<f64>, DatasetError> {
+    fn resample(&self, grid: Grid, extend: Extrapolation) -> Result<DMatrix<f64>, DatasetError> {
         let (first, last) = (self.wavelengths[0], self.wavelengths[self.wavelengths.len() - 1]);
-        if extend == Extend::Error && (grid.first() < first || grid.last() > last) {
+        if extend == Extrapolation::Error && (grid.first() < first || grid.last() > last) {
             return Err(DatasetError::Range { name: self.name.clone(), first, last, grid });
         }
         let mut columns = DMatrix::zeros(grid.len(), self.len());
@@ -222,8 +223,8 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Brings `tables` to `grid` and puts them together, in order. See [`Extend`] for wavelengths outside a table's.
-    pub fn new(tables: &[Table], grid: Grid, extend: Extend) -> Result<Dataset, DatasetError> {
+    /// Brings `tables` to `grid` and puts them together, in order. See [`Extrapolation`] for wavelengths outside a table's.
+    pub fn new(tables: &[Table], grid: Grid, extend: Extrapolation) -> Result<Dataset, DatasetError> {
         if tables.is_empty() {
             return Err(DatasetError::NoSpectra { name: "an empty list of tables".to_owned() });
         }

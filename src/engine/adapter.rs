@@ -47,7 +47,7 @@ impl Adapter {
     }
 }
 
-/// The adapters of this machine, in the order in which [`Choice::Adapter`](super::Choice::Adapter) counts them.
+/// The adapters of this machine, in the order in which [`EngineChoice::Adapter`](super::Choice::Adapter) counts them.
 /// `WGPU_BACKEND` limits them to some interfaces.
 pub fn adapters() -> Vec<Adapter> {
     enumerate().iter().map(Adapter::of).collect()

@@ -3,55 +3,56 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
-use super::{Batch, EngineError, Member, Pace, Window};
+use super::schedule::{Job, Pace, Window};
+use super::{Batch, EngineError};
 use crate::cpu::{self, Kernel};
-use crate::quantity::{Format, Quantity};
-use crate::stream::Draws;
+use crate::quantity::{ArrayFormat, Quantity};
+use crate::random::stream::DrawRange;
 
 /// How many windows there are: one with the caller, one being computed, one between them.
 const WINDOWS: usize = 3;
 
-/// The words of each output of each member.
+/// The words of each output of each job.
 type Room = Vec<Vec<Vec<u32>>>;
 
-pub(super) struct Drawer<'a> {
+pub(super) struct CpuSchedule<'a> {
     pool: &'a rayon::ThreadPool,
-    members: Vec<Role>,
+    jobs: Vec<ReadyJob>,
     pace: Pace,
     /// Windows that were used before: memory that the system has given already.
     rooms: Vec<Room>,
 }
 
-/// A member of the ensemble.
-struct Role {
+/// A job of the ensemble.
+struct ReadyJob {
     kernel: Kernel<f32>,
-    formats: Vec<Format>,
+    formats: Vec<ArrayFormat>,
     per_step: u64,
 }
 
-impl<'a> Drawer<'a> {
-    pub(super) fn new(pool: &'a rayon::ThreadPool, members: &[Member]) -> Self {
-        let role = |member: &Member| {
-            let program = member.recipe.program().tallied();
+impl<'a> CpuSchedule<'a> {
+    pub(super) fn new(pool: &'a rayon::ThreadPool, jobs: &[Job]) -> Self {
+        let role = |job: &Job| {
+            let program = job.recipe.program().with_status();
             let formats = program.outputs.iter().map(|output| output.format).collect();
-            Role { kernel: Kernel::new(&program), formats, per_step: member.per_step }
+            ReadyJob { kernel: Kernel::new(&program), formats, per_step: job.per_step }
         };
-        let roles: Vec<_> = members.iter().map(role).collect();
-        let pace = Pace::new(members, roles.iter().map(|role| role.formats.as_slice()), u64::MAX);
-        Drawer { pool, members: roles, pace, rooms: Vec::new() }
+        let roles: Vec<_> = jobs.iter().map(role).collect();
+        let pace = Pace::new(jobs, roles.iter().map(|role| role.formats.as_slice()), u64::MAX);
+        CpuSchedule { pool, jobs: roles, pace, rooms: Vec::new() }
     }
 
-    /// Makes `draws` of the only member with their spectra in the caller's memory, which has as many words as they
+    /// Makes `draws` of the only job with their spectra in the caller's memory, which has as many words as they
     /// need, and hands them to `sink` as one batch.
     pub(super) fn fill<E>(
         &mut self,
-        draws: Draws,
+        draws: DrawRange,
         spectra: &mut [u32],
         sink: &mut impl FnMut(Batch) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Role { kernel, formats, .. } = &self.members[0];
-        let words = |format: &Format| format.bytes(draws.count).div_ceil(4) as usize;
-        let is_spectra = |format: &&Format| format.quantity == Quantity::Spectra;
+        let ReadyJob { kernel, formats, .. } = &self.jobs[0];
+        let words = |format: &ArrayFormat| format.bytes(draws.count).div_ceil(4) as usize;
+        let is_spectra = |format: &&ArrayFormat| format.quantity == Quantity::Spectra;
         let mut others: Vec<_> =
             formats.iter().filter(|f| !is_spectra(f)).map(|format| vec![0; words(format)]).collect();
         let mut spectra = Some(spectra);
@@ -69,28 +70,27 @@ impl<'a> Drawer<'a> {
 
     pub(super) fn draw<E: From<EngineError>>(
         &mut self,
-        draws: &[Draws],
+        draws: &[DrawRange],
         steps: u64,
         sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
         let (full, filled) = sync_channel(WINDOWS);
         let (empty, emptied) = sync_channel(WINDOWS);
-        let members = &self.members;
-        self.rooms
-            .resize_with(WINDOWS, || members.iter().map(|m| vec![Vec::new(); m.formats.len()]).collect());
+        let jobs = &self.jobs;
+        self.rooms.resize_with(WINDOWS, || jobs.iter().map(|m| vec![Vec::new(); m.formats.len()]).collect());
         for room in self.rooms.drain(..) {
             empty.send(room).expect("there is room, and a receiver");
         }
         let (pool, pace) = (self.pool, &mut self.pace);
         std::thread::scope(|scope| {
-            let computing = scope.spawn(move || compute(pool, members, pace, (draws, steps), emptied, full));
+            let computing = scope.spawn(move || compute(pool, jobs, pace, (draws, steps), emptied, full));
             // Dropped before the thread is waited for, which might itself be waiting for a window.
             let empty = empty;
             for (window, room) in filled {
-                let members = members.iter().zip(draws).zip(&room);
-                let batches = members.map(|((member, draws), words)| {
+                let jobs = jobs.iter().zip(draws).zip(&room);
+                let batches = jobs.map(|((job, draws), words)| {
                     let arrays = words.iter().map(|words| bytemuck::cast_slice(words));
-                    Batch::new(window.of(*draws, member.per_step), &member.formats, arrays)
+                    Batch::new(window.of(*draws, job.per_step), &job.formats, arrays)
                 });
                 sink(&batches.collect::<Vec<_>>())?;
                 let _ = empty.send(room); // nobody fills it after the last
@@ -105,9 +105,9 @@ impl<'a> Drawer<'a> {
 /// Fills windows until all steps are made, or the caller has gone. Returns where the windows come back to.
 fn compute(
     pool: &rayon::ThreadPool,
-    members: &[Role],
+    jobs: &[ReadyJob],
     pace: &mut Pace,
-    (draws, steps): (&[Draws], u64),
+    (draws, steps): (&[DrawRange], u64),
     emptied: Receiver<Room>,
     full: SyncSender<(Window, Room)>,
 ) -> Receiver<Room> {
@@ -115,13 +115,13 @@ fn compute(
     while let Some(window) = pace.window(steps, offset) {
         let Ok(mut room) = emptied.recv() else { break };
         let start = Instant::now();
-        for ((member, draws), arrays) in members.iter().zip(draws).zip(&mut room) {
-            let part = window.of(*draws, member.per_step);
-            for (format, words) in member.formats.iter().zip(&mut *arrays) {
+        for ((job, draws), arrays) in jobs.iter().zip(draws).zip(&mut room) {
+            let part = window.of(*draws, job.per_step);
+            for (format, words) in job.formats.iter().zip(&mut *arrays) {
                 words.resize(format.bytes(part.count).div_ceil(4) as usize, 0);
             }
             let mut arrays: Vec<_> = arrays.iter_mut().map(Vec::as_mut_slice).collect();
-            pool.install(|| cpu::fill(&member.kernel, part, &mut arrays));
+            pool.install(|| cpu::fill(&job.kernel, part, &mut arrays));
         }
         pace.learn(window.steps, start);
         offset += window.steps;
@@ -136,16 +136,16 @@ fn compute(
 mod tests {
     use rayon::prelude::*;
 
-    use crate::engine::{Choice, Engine};
+    use crate::engine::{Engine, EngineChoice};
     use crate::model::Model;
+    use crate::random::stream::Stream;
     use crate::recipe::Recipe;
-    use crate::stream::Stream;
 
     /// Every thread of the caller's pool waits for draws at once: they must come from others.
     #[test]
     fn draws_are_made_for_callers_that_are_rayon_workers() {
-        let recipe = Recipe::new(&Model::builtin("granada").unwrap()).build().unwrap();
-        let engine = Engine::new(&Choice::Cpu).unwrap();
+        let recipe = Recipe::builder(&Model::builtin("granada").unwrap()).build().unwrap();
+        let engine = Engine::new(&EngineChoice::Cpu).unwrap();
         let draws = Stream::new(1).draws(0..5000);
         let expected = engine.collect(&recipe, draws).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();

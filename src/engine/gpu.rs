@@ -6,9 +6,10 @@ use std::time::Instant;
 
 use wgpu::{BufferUsages, Features, PollType};
 
-use super::{Adapter, Batch, EngineError, Member, Pace, Window};
+use super::schedule::{Job, Pace, Window};
+use super::{Adapter, Batch, EngineError};
+use crate::random::stream::DrawRange;
 use crate::sampler::{Prepared, Sampler};
-use crate::stream::Draws;
 
 /// How many windows are in flight: one with the caller, one being computed, one waiting to be.
 const RING: usize = 3;
@@ -99,9 +100,9 @@ impl Gpu {
 }
 
 /// The recipes of an ensemble on a device.
-pub(super) struct Drawer<'a> {
+pub(super) struct GpuSchedule<'a> {
     gpu: &'a Gpu,
-    members: Vec<Role>,
+    jobs: Vec<ReadyJob>,
     pace: Pace,
     /// The windows that are not in flight.
     slots: Vec<Slot>,
@@ -109,36 +110,36 @@ pub(super) struct Drawer<'a> {
     capacity: u64,
 }
 
-/// A member of the ensemble.
-struct Role {
+/// A job of the ensemble.
+struct ReadyJob {
     sampler: Sampler,
     per_step: u64,
 }
 
-impl<'a> Drawer<'a> {
-    pub(super) fn new(gpu: &'a Gpu, members: &[Member]) -> Result<Self, EngineError> {
-        let mut roles: Vec<Role> = Vec::new();
-        for (i, member) in members.iter().enumerate() {
-            let program = member.recipe.program();
-            let sampler = match members[..i].iter().position(|other| other.recipe.program() == program) {
+impl<'a> GpuSchedule<'a> {
+    pub(super) fn new(gpu: &'a Gpu, jobs: &[Job]) -> Result<Self, EngineError> {
+        let mut roles: Vec<ReadyJob> = Vec::new();
+        for (i, job) in jobs.iter().enumerate() {
+            let program = job.recipe.program();
+            let sampler = match jobs[..i].iter().position(|other| other.recipe.program() == program) {
                 Some(other) => roles[other].sampler.clone(),
-                None => Sampler::of(&gpu.device, &program.tallied())?,
+                None => Sampler::of(&gpu.device, &program.with_status())?,
             };
-            roles.push(Role { sampler, per_step: member.per_step });
+            roles.push(ReadyJob { sampler, per_step: job.per_step });
         }
         let limits = gpu.device.limits();
         let most = roles.iter().map(|role| role.sampler.max_count(&limits) / role.per_step).min();
         let pace = Pace::new(
-            members,
+            jobs,
             roles.iter().map(|role| role.sampler.formats()),
-            most.expect("an ensemble has members"),
+            most.expect("an ensemble has jobs"),
         );
-        Ok(Drawer { gpu, members: roles, pace, slots: Vec::new(), capacity: 0 })
+        Ok(GpuSchedule { gpu, jobs: roles, pace, slots: Vec::new(), capacity: 0 })
     }
 
     pub(super) fn draw<E: From<EngineError>>(
         &mut self,
-        draws: &[Draws],
+        draws: &[DrawRange],
         steps: u64,
         sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -149,8 +150,8 @@ impl<'a> Drawer<'a> {
         loop {
             while let Some(window) = self.pace.window(steps, offset) {
                 let Some(slot) = self.slots.pop() else { break };
-                let parts = self.members.iter().zip(draws);
-                let parts = parts.map(|(member, draws)| window.of(*draws, member.per_step)).collect();
+                let parts = self.jobs.iter().zip(draws);
+                let parts = parts.map(|(job, draws)| window.of(*draws, job.per_step)).collect();
                 flying.push_back((window, slot.submit(self.gpu, parts)));
                 offset += window.steps;
             }
@@ -168,7 +169,7 @@ impl<'a> Drawer<'a> {
     }
 
     /// Sees to it that there are slots for the windows of so many steps. An error while drawing loses some.
-    fn make_room(&mut self, draws: &[Draws], steps: u64) -> Result<(), EngineError> {
+    fn make_room(&mut self, draws: &[DrawRange], steps: u64) -> Result<(), EngineError> {
         let needed = self.pace.most.min(steps);
         if self.capacity < needed {
             self.slots.clear();
@@ -176,7 +177,7 @@ impl<'a> Drawer<'a> {
         }
         let window = Window { offset: 0, steps: self.capacity };
         while self.slots.len() < RING {
-            self.slots.push(Slot::new(self.gpu, &self.members, draws, window)?);
+            self.slots.push(Slot::new(self.gpu, &self.jobs, draws, window)?);
         }
         Ok(())
     }
@@ -184,7 +185,7 @@ impl<'a> Drawer<'a> {
 
 /// Buffers for one window.
 struct Slot {
-    /// One a member.
+    /// One a job.
     prepared: Vec<Prepared>,
     /// Copies of the buffers that the host can map, where it cannot map the originals.
     staging: Option<Vec<wgpu::Buffer>>,
@@ -193,20 +194,20 @@ struct Slot {
 /// A window that was submitted.
 struct Flight {
     slot: Slot,
-    /// Those of each member.
-    draws: Vec<Draws>,
+    /// Those of each job.
+    draws: Vec<DrawRange>,
     submission: wgpu::SubmissionIndex,
     /// What mapping each buffer came to.
     mapped: Vec<Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>>,
 }
 
 impl Slot {
-    fn new(gpu: &Gpu, members: &[Role], draws: &[Draws], window: Window) -> Result<Slot, EngineError> {
+    fn new(gpu: &Gpu, jobs: &[ReadyJob], draws: &[DrawRange], window: Window) -> Result<Slot, EngineError> {
         let usage = if gpu.shared_memory { BufferUsages::MAP_READ } else { BufferUsages::COPY_SRC };
-        let prepare = |(member, draws): (&Role, &Draws)| {
-            member.sampler.prepare_for(&gpu.device, window.of(*draws, member.per_step), usage)
+        let prepare = |(job, draws): (&ReadyJob, &DrawRange)| {
+            job.sampler.prepare_for(&gpu.device, window.of(*draws, job.per_step), usage)
         };
-        let prepared = members.iter().zip(draws).map(prepare).collect::<Result<Vec<_>, _>>()?;
+        let prepared = jobs.iter().zip(draws).map(prepare).collect::<Result<Vec<_>, _>>()?;
         let copy = |buffer: &wgpu::Buffer| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("spectroll staging"),
@@ -220,7 +221,7 @@ impl Slot {
         Ok(Slot { prepared, staging })
     }
 
-    fn submit(mut self, gpu: &Gpu, draws: Vec<Draws>) -> Flight {
+    fn submit(mut self, gpu: &Gpu, draws: Vec<DrawRange>) -> Flight {
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("spectroll") };
         let mut encoder = gpu.device.create_command_encoder(&descriptor);
         for (prepared, draws) in self.prepared.iter_mut().zip(&draws) {
@@ -263,8 +264,8 @@ impl Flight {
             let view = |buffer: &wgpu::Buffer| buffer.get_mapped_range(..).expect("it has landed");
             let views: Vec<_> = self.slot.readable().map(view).collect();
             let mut arrays = views.iter().map(|view| &view[..]);
-            let members = self.slot.prepared.iter().zip(&self.draws);
-            let batches = members.map(|(prepared, draws)| {
+            let jobs = self.slot.prepared.iter().zip(&self.draws);
+            let batches = jobs.map(|(prepared, draws)| {
                 let formats = prepared.formats();
                 Batch::new(*draws, formats, arrays.by_ref().take(formats.len()).collect::<Vec<_>>())
             });

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use super::Encoder;
 use super::schema::{Field, Schema};
-use crate::quantity::Element;
+use crate::quantity::Dtype;
 
 pub(super) struct Csv<W: Write> {
     to: W,
@@ -70,12 +70,12 @@ fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
 }
 
 /// Adds the shortest decimal that reads back as the same value of its type.
-fn push(text: &mut String, element: Element, value: f64) {
+fn push(text: &mut String, element: Dtype, value: f64) {
     match element {
-        Element::F64 | Element::U32 => write!(text, "{value}"),
-        Element::F32 => write!(text, "{}", value as f32),
+        Dtype::F64 | Dtype::U32 => write!(text, "{value}"),
+        Dtype::F32 => write!(text, "{}", value as f32),
         // Its own shortest form would be ambiguous to those who read it as anything else.
-        Element::F16 => write!(text, "{}", half::f16::from_f64(value).to_f32()),
+        Dtype::F16 => write!(text, "{}", half::f16::from_f64(value).to_f32()),
     }
     .expect("a string takes it all");
 }

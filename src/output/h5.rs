@@ -7,8 +7,8 @@ use std::path::Path;
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, Hdf5Error, LibverBound};
 
 use super::Encoder;
-use super::schema::{Constant, Field, Schema};
-use crate::quantity::Element;
+use super::schema::{Field, Schema, SharedArray};
+use crate::quantity::Dtype;
 
 /// About how many bytes a chunk has: what the library of most readers keeps in its cache.
 const CHUNK_BYTES: usize = 1 << 20;
@@ -67,17 +67,17 @@ pub(super) fn create(path: &Path, userblock: u64) -> Result<H5File, Hdf5Error> {
 }
 
 /// Writes an array that all draws share.
-pub(super) fn constant(file: &H5File, constant: &Constant) -> Result<H5Dataset, Hdf5Error> {
+pub(super) fn constant(file: &H5File, constant: &SharedArray) -> Result<H5Dataset, Hdf5Error> {
     let shape: Vec<usize> = constant.shape().iter().map(|&n| n as usize).collect();
     let set = match constant.element {
-        Element::F32 => file.new_dataset::<f32>().shape(shape).create(&constant.name)?,
-        Element::F64 => file.new_dataset::<f64>().shape(shape).create(&constant.name)?,
-        Element::U32 => file.new_dataset::<u32>().shape(shape).create(&constant.name)?,
-        Element::F16 => unreachable!("what draws share is kept as it was drawn"),
+        Dtype::F32 => file.new_dataset::<f32>().shape(shape).create(&constant.name)?,
+        Dtype::F64 => file.new_dataset::<f64>().shape(shape).create(&constant.name)?,
+        Dtype::U32 => file.new_dataset::<u32>().shape(shape).create(&constant.name)?,
+        Dtype::F16 => unreachable!("what draws share is kept as it was drawn"),
     };
     match constant.element {
-        Element::F32 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f32>(&constant.bytes))?,
-        Element::F64 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f64>(&constant.bytes))?,
+        Dtype::F32 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f32>(&constant.bytes))?,
+        Dtype::F64 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f64>(&constant.bytes))?,
         _ => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, u32>(&constant.bytes))?,
     }
     Ok(set)
@@ -108,13 +108,13 @@ impl Tables {
             let mut chunk = shape.clone();
             chunk[0] = rows;
             let set = match field.stored {
-                Element::F16 => {
+                Dtype::F16 => {
                     let f16 = DatatypeMessage::f16_type();
                     file.new_dataset::<u16>().datatype(f16).shape(shape).chunk(&chunk).create(&field.name)
                 }
-                Element::F32 => file.new_dataset::<f32>().shape(shape).chunk(&chunk).create(&field.name),
-                Element::F64 => file.new_dataset::<f64>().shape(shape).chunk(&chunk).create(&field.name),
-                Element::U32 => file.new_dataset::<u32>().shape(shape).chunk(&chunk).create(&field.name),
+                Dtype::F32 => file.new_dataset::<f32>().shape(shape).chunk(&chunk).create(&field.name),
+                Dtype::F64 => file.new_dataset::<f64>().shape(shape).chunk(&chunk).create(&field.name),
+                Dtype::U32 => file.new_dataset::<u32>().shape(shape).chunk(&chunk).create(&field.name),
             }?;
             let chunk = rows * field.stored_bytes();
             Ok(Table { set, field: field.clone(), chunk, rest: Vec::new(), written: 0 })

@@ -14,7 +14,7 @@ use rust_hdf5::{H5Dataset, H5File, Hdf5Error};
 use super::Encoder;
 use super::h5::{self, io_error};
 use super::schema::Schema;
-use crate::quantity::Element;
+use crate::quantity::Dtype;
 
 /// What comes before HDF5: 116 characters of text, and a version.
 const USERBLOCK: u64 = 512;
@@ -83,12 +83,12 @@ impl Encoder for Mat {
     }
 }
 
-fn matlab_class(element: Element) -> &'static str {
+fn matlab_class(element: Dtype) -> &'static str {
     match element {
-        Element::F32 => "single",
-        Element::F64 => "double",
-        Element::U32 => "uint32",
-        Element::F16 => unreachable!("the format holds no halves: see Format::check"),
+        Dtype::F32 => "single",
+        Dtype::F64 => "double",
+        Dtype::U32 => "uint32",
+        Dtype::F16 => unreachable!("the format holds no halves: see Format::check"),
     }
 }
 

@@ -13,26 +13,24 @@ mod npy;
 mod npz;
 #[cfg(feature = "parquet")]
 mod parquet;
-mod parts;
 mod pending;
 mod schema;
 mod set;
 mod spd;
-mod zarr;
 
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use crate::quantity::Element;
+use crate::quantity::Dtype;
 
-pub use pending::{Existing, Pending, write_file};
-pub use schema::{Constant, Field, Schema};
-pub use set::{Audit, Layout, Outcome, Plan, SetWriter, Shard, Start, merge};
+pub use pending::{IfExists, PendingFile, write_file};
+pub use schema::{Field, Schema, SharedArray};
+pub use set::{ChunkFormat, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge};
 pub use spd::{MOST_FILES, SpdFolder, SpdName};
 
 /// A format of data sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum FileFormat {
     /// NumPy: one array, C order.
     Npy,
     /// NumPy: an array a quantity.
@@ -56,7 +54,7 @@ pub enum Format {
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum OutputError {
-    #[error("{path:?}: unknown format; name it {}, or pass --format", Format::EXTENSIONS)]
+    #[error("{path:?}: unknown format; name it {}, or pass --format", FileFormat::EXTENSIONS)]
     UnknownFormat { path: PathBuf },
     #[error("{path:?} exists already: choose another name, or pass --force to replace it")]
     Exists { path: PathBuf },
@@ -112,21 +110,21 @@ fn partial(path: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
-impl Format {
+impl FileFormat {
     /// The names that tell formats apart.
     const EXTENSIONS: &str = ".npy, .npz, .csv, .h5, .mat, .parquet or .zarr";
 
     /// The format that the extension of `path` names.
-    pub fn of(path: &Path) -> Result<Format, OutputError> {
+    pub fn of(path: &Path) -> Result<FileFormat, OutputError> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("npy") => Ok(Format::Npy),
-            Some("npz") => Ok(Format::Npz),
-            Some("csv") => Ok(Format::Csv),
-            Some("h5" | "hdf5") => Ok(Format::Hdf5),
-            Some("mat") => Ok(Format::Mat),
-            Some("parquet") => Ok(Format::Parquet),
-            Some("zarr") => Ok(Format::Zarr),
-            Some("spd") => Ok(Format::Spd),
+            Some("npy") => Ok(FileFormat::Npy),
+            Some("npz") => Ok(FileFormat::Npz),
+            Some("csv") => Ok(FileFormat::Csv),
+            Some("h5" | "hdf5") => Ok(FileFormat::Hdf5),
+            Some("mat") => Ok(FileFormat::Mat),
+            Some("parquet") => Ok(FileFormat::Parquet),
+            Some("zarr") => Ok(FileFormat::Zarr),
+            Some("spd") => Ok(FileFormat::Spd),
             _ => Err(OutputError::UnknownFormat { path: path.to_owned() }),
         }
     }
@@ -135,8 +133,8 @@ impl Format {
     pub fn check(self, path: &Path, schema: &Schema) -> Result<(), OutputError> {
         let path = path.to_owned();
         let built = match self {
-            Format::Hdf5 | Format::Mat => (cfg!(feature = "hdf5"), "HDF5", "hdf5"),
-            Format::Parquet => (cfg!(feature = "parquet"), "Parquet", "parquet"),
+            FileFormat::Hdf5 | FileFormat::Mat => (cfg!(feature = "hdf5"), "HDF5", "hdf5"),
+            FileFormat::Parquet => (cfg!(feature = "parquet"), "Parquet", "parquet"),
             _ => (true, "", ""),
         };
         if let (false, what, feature) = built {
@@ -144,22 +142,22 @@ impl Format {
         }
         let one = schema.fields.len() == 1;
         let shares = !schema.constants.is_empty();
-        let halves = schema.fields.iter().any(|field| field.stored == Element::F16);
+        let halves = schema.fields.iter().any(|field| field.stored == Dtype::F16);
         let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
         let of_scenes = schema.row == "scene";
         match self {
-            Format::Npy | Format::Csv | Format::Parquet | Format::Spd if shares => {
+            FileFormat::Npy | FileFormat::Csv | FileFormat::Parquet | FileFormat::Spd if shares => {
                 cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
             }
-            Format::Npy if !one && of_scenes => {
+            FileFormat::Npy if !one && of_scenes => {
                 let remedy = "choose one with --arrays, or name it .npz, .zarr, .h5 or .parquet";
                 cannot(".npy", "one array", remedy)
             }
-            Format::Npy if !one => {
+            FileFormat::Npy if !one => {
                 let remedy = "choose one with --quantities, or name it .npz, .zarr, .h5 or .parquet";
                 cannot(".npy", "one array", remedy)
             }
-            Format::Spd if !(one && schema.fields[0].axis.as_deref() == Some("wavelength")) => {
+            FileFormat::Spd if !(one && schema.fields[0].axis.as_deref() == Some("wavelength")) => {
                 let scene = "choose one group's spectra with --arrays";
                 cannot(
                     ".spd",
@@ -167,22 +165,22 @@ impl Format {
                     if of_scenes { scene } else { "choose them with --quantities spectra" },
                 )
             }
-            Format::Mat if halves => cannot(".mat", "f32 and f64", "choose one with --dtype"),
-            Format::Parquet if halves => cannot(".parquet", "f32 and f64", "choose one with --dtype"),
+            FileFormat::Mat if halves => cannot(".mat", "f32 and f64", "choose one with --dtype"),
+            FileFormat::Parquet if halves => cannot(".parquet", "f32 and f64", "choose one with --dtype"),
             _ => Ok(()),
         }
     }
 }
 
-impl Layout {
+impl ChunkFormat {
     /// An error where the layout cannot hold what a schema says, or was left out of this build.
     pub fn check(self, path: &Path, schema: &Schema) -> Result<(), OutputError> {
         match self {
-            Layout::Zarr { zstd: Some(_) } if !cfg!(feature = "zstd") => {
+            ChunkFormat::Zarr { zstd: Some(_) } if !cfg!(feature = "zstd") => {
                 Err(OutputError::NotBuilt { path: path.to_owned(), what: "Zstandard", feature: "zstd" })
             }
-            Layout::Zarr { .. } | Layout::Npy => Ok(()),
-            Layout::Parquet => Format::Parquet.check(path, schema),
+            ChunkFormat::Zarr { .. } | ChunkFormat::Npy => Ok(()),
+            ChunkFormat::Parquet => FileFormat::Parquet.check(path, schema),
         }
     }
 }
@@ -199,19 +197,19 @@ trait Encoder {
 /// A file that appears under its name only when it is complete.
 pub struct FileWriter {
     encoder: Box<dyn Encoder>,
-    pending: Pending,
+    pending: PendingFile,
 }
 
 impl FileWriter {
     /// Begins a file that will appear as `path`. The format is one of those of a single file.
     pub fn create(
         path: &Path,
-        format: Format,
+        format: FileFormat,
         schema: &Schema,
-        existing: Existing,
+        existing: IfExists,
     ) -> Result<FileWriter, OutputError> {
         format.check(path, schema)?;
-        let pending = Pending::create(path, existing)?;
+        let pending = PendingFile::create(path, existing)?;
         let encoder = encoder(format, schema, &pending).map_err(|e| pending.failed(e))?;
         Ok(FileWriter { encoder, pending })
     }
@@ -230,21 +228,21 @@ impl FileWriter {
     }
 }
 
-fn encoder(format: Format, schema: &Schema, pending: &Pending) -> io::Result<Box<dyn Encoder>> {
+fn encoder(format: FileFormat, schema: &Schema, pending: &PendingFile) -> io::Result<Box<dyn Encoder>> {
     let file = pending.file().map_err(|e| match e {
         OutputError::Write { source, .. } => source,
         other => io::Error::other(other),
     })?;
     Ok(match format {
-        Format::Npy => Box::new(npy::Npy::begin(file, schema)?),
-        Format::Npz => Box::new(npz::Npz::begin(file, schema)?),
-        Format::Csv => Box::new(csv::Csv::begin(BufWriter::new(file), schema)?),
+        FileFormat::Npy => Box::new(npy::Npy::begin(file, schema)?),
+        FileFormat::Npz => Box::new(npz::Npz::begin(file, schema)?),
+        FileFormat::Csv => Box::new(csv::Csv::begin(BufWriter::new(file), schema)?),
         #[cfg(feature = "hdf5")]
-        Format::Hdf5 => Box::new(h5::Hdf5::begin(pending.temporary_path(), schema)?),
+        FileFormat::Hdf5 => Box::new(h5::Hdf5::begin(pending.temporary_path(), schema)?),
         #[cfg(feature = "hdf5")]
-        Format::Mat => Box::new(mat::Mat::begin(pending.temporary_path(), schema)?),
+        FileFormat::Mat => Box::new(mat::Mat::begin(pending.temporary_path(), schema)?),
         #[cfg(feature = "parquet")]
-        Format::Parquet => Box::new(parquet::Parquet::begin(file, schema)?),
+        FileFormat::Parquet => Box::new(parquet::Parquet::begin(file, schema)?),
         _ => unreachable!("the others are no single files, or were refused by Format::check"),
     })
 }
@@ -270,15 +268,15 @@ mod tests {
 
     #[test]
     fn formats_are_known_by_their_names() {
-        assert_eq!(Format::of(Path::new("a/b.NPY")).unwrap(), Format::Npy);
-        assert_eq!(Format::of(Path::new("b.zarr/")).unwrap(), Format::Zarr);
-        assert!(Format::of(Path::new("x.xlsx")).unwrap_err().to_string().contains(".npy, .npz, .csv"));
+        assert_eq!(FileFormat::of(Path::new("a/b.NPY")).unwrap(), FileFormat::Npy);
+        assert_eq!(FileFormat::of(Path::new("b.zarr/")).unwrap(), FileFormat::Zarr);
+        assert!(FileFormat::of(Path::new("x.xlsx")).unwrap_err().to_string().contains(".npy, .npz, .csv"));
     }
 
     #[test]
     fn what_a_format_cannot_hold_is_refused() {
-        let spectra = Field::vector("spectra", "wavelength", 31, Element::F32);
-        let lrv = Field::scalar("lrv", Element::F32);
+        let spectra = Field::vector("spectra", "wavelength", 31, Dtype::F32);
+        let lrv = Field::scalar("lrv", Dtype::F32);
         let schema = |fields: &[&Field]| Schema {
             fields: fields.iter().copied().cloned().collect(),
             row: "draw".to_owned(),
@@ -287,14 +285,14 @@ mod tests {
             wavelengths: vec![400.0; 31],
             attributes: serde_json::Map::new(),
         };
-        let error = |format: Format, schema: &Schema| {
+        let error = |format: FileFormat, schema: &Schema| {
             format.check(Path::new("x"), schema).err().map(|e| e.to_string()).unwrap_or_default()
         };
-        assert!(error(Format::Npy, &schema(&[&spectra, &lrv])).contains("hold one array"));
-        assert!(error(Format::Spd, &schema(&[&lrv])).contains("hold spectra"));
-        let halves = schema(&[&spectra.clone().stored_as(Element::F16)]);
-        assert_eq!(error(Format::Npy, &halves), "");
+        assert!(error(FileFormat::Npy, &schema(&[&spectra, &lrv])).contains("hold one array"));
+        assert!(error(FileFormat::Spd, &schema(&[&lrv])).contains("hold spectra"));
+        let halves = schema(&[&spectra.clone().stored_as(Dtype::F16)]);
+        assert_eq!(error(FileFormat::Npy, &halves), "");
         #[cfg(feature = "hdf5")]
-        assert!(error(Format::Mat, &halves).contains("--dtype"));
+        assert!(error(FileFormat::Mat, &halves).contains("--dtype"));
     }
 }

@@ -6,7 +6,7 @@ use npyz::WriterBuilder;
 
 use super::Encoder;
 use super::schema::{Field, Schema};
-use crate::quantity::Element;
+use crate::quantity::Dtype;
 
 pub(super) struct Npy<W> {
     to: W,
@@ -48,11 +48,11 @@ pub(super) fn header(dtype: &str, shape: &[u64]) -> io::Result<Vec<u8>> {
 }
 
 /// What NumPy's headers call a type.
-pub(super) fn type_string(element: Element) -> &'static str {
+pub(super) fn type_string(element: Dtype) -> &'static str {
     match element {
-        Element::F16 => "<f2",
-        Element::F32 => "<f4",
-        Element::F64 => "<f8",
-        Element::U32 => "<u4",
+        Dtype::F16 => "<f2",
+        Dtype::F32 => "<f4",
+        Dtype::F64 => "<f8",
+        Dtype::U32 => "<u4",
     }
 }

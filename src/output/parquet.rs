@@ -21,7 +21,7 @@ use parquet::schema::types::{Type, TypePtr};
 
 use super::Encoder;
 use super::schema::{Field, Schema};
-use crate::quantity::Element;
+use crate::quantity::Dtype;
 
 /// About how many bytes a row group has. Groups are the same whatever the windows that came.
 const GROUP_BYTES: u64 = 16 << 20;
@@ -110,10 +110,10 @@ fn write_column(
     bytes: &[u8],
 ) -> Result<(), ParquetError> {
     match field.stored {
-        Element::F32 => write_values::<FloatType, 4>(writer, field, bytes, f32::from_le_bytes),
-        Element::F64 => write_values::<DoubleType, 8>(writer, field, bytes, f64::from_le_bytes),
-        Element::U32 => write_values::<Int32Type, 4>(writer, field, bytes, i32::from_le_bytes),
-        Element::F16 => unreachable!("the format holds no halves: see Format::check"),
+        Dtype::F32 => write_values::<FloatType, 4>(writer, field, bytes, f32::from_le_bytes),
+        Dtype::F64 => write_values::<DoubleType, 8>(writer, field, bytes, f64::from_le_bytes),
+        Dtype::U32 => write_values::<Int32Type, 4>(writer, field, bytes, i32::from_le_bytes),
+        Dtype::F16 => unreachable!("the format holds no halves: see Format::check"),
     }
 }
 
@@ -143,8 +143,8 @@ fn root(fields: &[Field]) -> TypePtr {
     let fields = fields.iter().map(|field| {
         let name = if field.is_list() { "element" } else { &field.name };
         let (physical, logical) = match field.stored {
-            Element::F32 => (Physical::FLOAT, None),
-            Element::F64 => (Physical::DOUBLE, None),
+            Dtype::F32 => (Physical::FLOAT, None),
+            Dtype::F64 => (Physical::DOUBLE, None),
             _ => (Physical::INT32, Some(LogicalType::integer(32, false))),
         };
         let value = Type::primitive_type_builder(name, physical)
@@ -226,19 +226,19 @@ fn arrow_field(to: &mut FlatBufferBuilder, field: &Field) -> Table {
     arrow_node(to, &field.name, FIXED_SIZE_LIST, list, &[value])
 }
 
-fn arrow_value(to: &mut FlatBufferBuilder, name: &str, element: Element) -> Table {
+fn arrow_value(to: &mut FlatBufferBuilder, name: &str, element: Dtype) -> Table {
     const INTEGER: u8 = 2;
     const FLOATING_POINT: u8 = 3;
     let table: WIPOffset<TableUnfinishedWIPOffset> = to.start_table();
     let kind = match element {
-        Element::U32 => {
+        Dtype::U32 => {
             to.push_slot_always(entry(0), 32i32); // bits; not signed is the default
             INTEGER
         }
         float => {
             let precision = match float {
-                Element::F16 => 0i16,
-                Element::F32 => 1,
+                Dtype::F16 => 0i16,
+                Dtype::F32 => 1,
                 _ => 2,
             };
             to.push_slot_always(entry(0), precision);

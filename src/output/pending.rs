@@ -15,24 +15,24 @@ pub(super) const SUFFIX: &str = ".partial";
 
 /// What to do where something of the name exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Existing {
+pub enum IfExists {
     /// Refuse.
-    Keep,
+    Refuse,
     /// Replace it, once the new one is complete.
     Replace,
 }
 
-/// A file on its way to a name: a temporary one beside it until [`Pending::finish`], and gone if that never comes.
+/// A file on its way to a name: a temporary one beside it until [`PendingFile::finish`], and gone if that never comes.
 #[derive(Debug)]
-pub struct Pending {
+pub struct PendingFile {
     file: NamedTempFile,
     path: PathBuf,
-    existing: Existing,
+    existing: IfExists,
 }
 
-impl Pending {
+impl PendingFile {
     /// Begins a file that will appear as `path`.
-    pub fn create(path: &Path, existing: Existing) -> Result<Pending, OutputError> {
+    pub fn create(path: &Path, existing: IfExists) -> Result<PendingFile, OutputError> {
         let path = path.to_owned();
         if path.is_dir() {
             return Err(OutputError::Folder { path });
@@ -40,11 +40,11 @@ impl Pending {
         if path.exists() && !path.is_file() {
             return Err(OutputError::Special { path }); // a device, say: --force -o /dev/null must not replace it
         }
-        if existing == Existing::Keep && path.symlink_metadata().is_ok() {
+        if existing == IfExists::Refuse && path.symlink_metadata().is_ok() {
             return Err(OutputError::Exists { path });
         }
         match temporary(existing_folder(&path)?, PREFIX) {
-            Ok(file) => Ok(Pending { file, path, existing }),
+            Ok(file) => Ok(PendingFile { file, path, existing }),
             Err(source) => Err(OutputError::Write { path, source }),
         }
     }
@@ -62,12 +62,12 @@ impl Pending {
 
     /// Makes the file appear under its name, complete and on disk.
     pub fn finish(self) -> Result<(), OutputError> {
-        let Pending { file, path, existing } = self;
+        let PendingFile { file, path, existing } = self;
         let failed = |source| OutputError::Write { path: path.clone(), source };
         file.as_file().sync_all().map_err(failed)?;
         match existing {
-            Existing::Keep => file.persist_noclobber(&path), // nobody's file that appeared meanwhile
-            Existing::Replace => file.persist(&path),
+            IfExists::Refuse => file.persist_noclobber(&path), // nobody's file that appeared meanwhile
+            IfExists::Replace => file.persist(&path),
         }
         .map_err(|e| failed(e.error))?;
         sync_folder(folder(&path));
@@ -81,8 +81,8 @@ impl Pending {
 }
 
 /// Writes a whole file, which appears only when it is complete.
-pub fn write_file(path: &Path, existing: Existing, bytes: &[u8]) -> Result<(), OutputError> {
-    let pending = Pending::create(path, existing)?;
+pub fn write_file(path: &Path, existing: IfExists, bytes: &[u8]) -> Result<(), OutputError> {
+    let pending = PendingFile::create(path, existing)?;
     pending.file()?.write_all(bytes).map_err(|e| pending.failed(e))?;
     pending.finish()
 }
@@ -156,22 +156,22 @@ mod tests {
         let path = folder.path().join("x.csv");
         let files = || fs::read_dir(folder.path()).unwrap().count();
         {
-            let pending = Pending::create(&path, Existing::Keep).unwrap();
+            let pending = PendingFile::create(&path, IfExists::Refuse).unwrap();
             pending.file().unwrap().write_all(b"half").unwrap();
             assert!(!path.exists());
         }
         assert_eq!(files(), 0);
-        write_file(&path, Existing::Keep, b"whole").unwrap();
+        write_file(&path, IfExists::Refuse, b"whole").unwrap();
         assert_eq!((fs::read(&path).unwrap(), files()), (b"whole".to_vec(), 1));
-        assert!(matches!(write_file(&path, Existing::Keep, b"new"), Err(OutputError::Exists { .. })));
-        write_file(&path, Existing::Replace, b"new").unwrap();
+        assert!(matches!(write_file(&path, IfExists::Refuse, b"new"), Err(OutputError::Exists { .. })));
+        write_file(&path, IfExists::Replace, b"new").unwrap();
         assert_eq!((fs::read(&path).unwrap(), files()), (b"new".to_vec(), 1));
     }
 
     #[test]
     fn what_is_in_the_way_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        let error = |path: &Path| Pending::create(path, Existing::Keep).unwrap_err().to_string();
+        let error = |path: &Path| PendingFile::create(path, IfExists::Refuse).unwrap_err().to_string();
         assert!(error(folder.path()).contains("is a folder"));
         assert!(error(&folder.path().join("a/b.npy")).contains("does not exist: create it first"));
     }

@@ -7,15 +7,15 @@ use half::f16;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::quantity::{Element, Interval};
+use crate::quantity::{Dtype, ValueRange};
 
 /// The value that bytes hold, as f64, which holds every one of these exactly.
-fn read(element: Element, bytes: &[u8]) -> f64 {
+fn read(element: Dtype, bytes: &[u8]) -> f64 {
     match element {
-        Element::F16 => f16::from_le_bytes([bytes[0], bytes[1]]).to_f64(),
-        Element::F32 => f32::from_le_bytes(bytes.try_into().expect("four bytes")).into(),
-        Element::F64 => f64::from_le_bytes(bytes.try_into().expect("eight bytes")),
-        Element::U32 => u32::from_le_bytes(bytes.try_into().expect("four bytes")).into(),
+        Dtype::F16 => f16::from_le_bytes([bytes[0], bytes[1]]).to_f64(),
+        Dtype::F32 => f32::from_le_bytes(bytes.try_into().expect("four bytes")).into(),
+        Dtype::F64 => f64::from_le_bytes(bytes.try_into().expect("eight bytes")),
+        Dtype::U32 => u32::from_le_bytes(bytes.try_into().expect("four bytes")).into(),
     }
 }
 
@@ -32,22 +32,22 @@ pub struct Field {
     /// How many values a draw has, in all its rows.
     pub width: usize,
     /// The type of the values as they are delivered.
-    pub element: Element,
+    pub element: Dtype,
     /// The type that they are written as.
-    pub stored: Element,
+    pub stored: Dtype,
     /// What they are between, and stay between when they are rounded; `None` where that is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub interval: Option<Interval>,
+    pub interval: Option<ValueRange>,
 }
 
 impl Field {
     /// A quantity of `width` values a draw, over `axis`.
-    pub fn vector(name: &str, axis: &str, width: usize, element: Element) -> Field {
+    pub fn vector(name: &str, axis: &str, width: usize, element: Dtype) -> Field {
         Field { width, axis: Some(axis.to_owned()), ..Field::scalar(name, element) }
     }
 
     /// A quantity of one value a draw.
-    pub fn scalar(name: &str, element: Element) -> Field {
+    pub fn scalar(name: &str, element: Dtype) -> Field {
         let name = name.to_owned();
         Field { name, axis: None, outer: None, width: 1, element, stored: element, interval: None }
     }
@@ -58,15 +58,15 @@ impl Field {
     }
 
     /// The same, written as another type of float where it is one.
-    pub fn stored_as(mut self, stored: Element) -> Field {
-        if self.element != Element::U32 {
+    pub fn stored_as(mut self, stored: Dtype) -> Field {
+        if self.element != Dtype::U32 {
             self.stored = stored;
         }
         self
     }
 
     /// The same, with values in an interval.
-    pub fn within(self, interval: Interval) -> Field {
+    pub fn within(self, interval: ValueRange) -> Field {
         Field { interval: Some(interval), ..self }
     }
 
@@ -107,22 +107,22 @@ impl Field {
         let values = bytes.chunks_exact(self.element.size());
         let mut out = Vec::with_capacity(values.len() * self.stored.size());
         match (self.element, self.stored) {
-            (from, Element::F16) => {
+            (from, Dtype::F16) => {
                 for value in values.map(|v| read(from, v)) {
                     out.extend_from_slice(&self.half(value)?.to_le_bytes());
                 }
             }
-            (from, Element::F32) => {
+            (from, Dtype::F32) => {
                 values.for_each(|v| out.extend_from_slice(&(read(from, v) as f32).to_le_bytes()));
             }
-            (from, Element::F64) => values.for_each(|v| out.extend_from_slice(&read(from, v).to_le_bytes())),
-            (_, Element::U32) => unreachable!("no float is written as an integer"),
+            (from, Dtype::F64) => values.for_each(|v| out.extend_from_slice(&read(from, v).to_le_bytes())),
+            (_, Dtype::U32) => unreachable!("no float is written as an integer"),
         }
         Ok(Cow::Owned(out))
     }
 
     fn half(&self, value: f64) -> io::Result<f16> {
-        let [least, largest] = self.interval.map_or([f32::NEG_INFINITY, f32::INFINITY], Interval::halves);
+        let [least, largest] = self.interval.map_or([f32::NEG_INFINITY, f32::INFINITY], ValueRange::halves);
         let half = f16::from_f64(value.clamp(least.into(), largest.into()));
         if half.is_infinite() && value.is_finite() {
             let (name, most) = (&self.name, f16::MAX);
@@ -141,26 +141,26 @@ impl Field {
 
 /// An array that all draws share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Constant {
+pub struct SharedArray {
     /// Its name.
     pub name: String,
     /// Its dimensions: their names and extents.
     pub axes: Vec<(String, u64)>,
     /// The type of its values.
-    pub element: Element,
+    pub element: Dtype,
     /// Its values in C order. A set of chunks has them in a file of their own.
     #[serde(skip)]
     pub bytes: Vec<u8>,
 }
 
 /// Ignores the values, which a manifest does not hold: those of one description are the same.
-impl PartialEq for Constant {
-    fn eq(&self, other: &Constant) -> bool {
+impl PartialEq for SharedArray {
+    fn eq(&self, other: &SharedArray) -> bool {
         (&self.name, &self.axes, self.element) == (&other.name, &other.axes, other.element)
     }
 }
 
-impl Constant {
+impl SharedArray {
     /// The extents of its dimensions.
     pub(super) fn shape(&self) -> Vec<u64> {
         self.axes.iter().map(|(_, extent)| *extent).collect()
@@ -177,7 +177,7 @@ pub struct Schema {
     pub row: String,
     /// Arrays that all draws share.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub constants: Vec<Constant>,
+    pub constants: Vec<SharedArray>,
     /// How many draws there are.
     pub count: u64,
     /// The wavelengths that the axis `wavelength` stands for, nm.
@@ -226,18 +226,18 @@ mod tests {
 
     #[test]
     fn values_are_written_as_asked() {
-        let field = Field::vector("x", "wavelength", 2, Element::F32);
+        let field = Field::vector("x", "wavelength", 2, Dtype::F32);
         let values = [0.1f32, 1.0, 65504.0, 1e-7];
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         assert!(matches!(field.store(&bytes), Ok(Cow::Borrowed(_))));
-        let double = field.clone().stored_as(Element::F64);
+        let double = field.clone().stored_as(Dtype::F64);
         let expected: Vec<u8> = values.iter().flat_map(|&v| f64::from(v).to_le_bytes()).collect();
         assert_eq!(*double.store(&bytes).unwrap(), expected);
-        let half = field.stored_as(Element::F16);
+        let half = field.stored_as(Dtype::F16);
         let expected: Vec<u8> = values.iter().flat_map(|&v| f16::from_f32(v).to_le_bytes()).collect();
         assert_eq!(*half.store(&bytes).unwrap(), expected);
         assert_eq!(half.shape(5), [5, 2]);
-        let attempts = Field::scalar("attempts", Element::U32).stored_as(Element::F16);
-        assert_eq!((attempts.stored, attempts.shape(5)), (Element::U32, vec![5]));
+        let attempts = Field::scalar("attempts", Dtype::U32).stored_as(Dtype::F16);
+        assert_eq!((attempts.stored, attempts.shape(5)), (Dtype::U32, vec![5]));
     }
 }

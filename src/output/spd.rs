@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use super::pending::{self, existing_folder};
 use super::schema::Schema;
-use super::{Existing, OutputError};
+use super::{IfExists, OutputError};
 
 /// The most files that are written without being asked twice: folders of more are slow to open, and to delete.
 pub const MOST_FILES: u64 = 10_000;
@@ -53,7 +53,7 @@ impl SpdFolder {
         schema: &Schema,
         name: SpdName,
         first: u64,
-        existing: Existing,
+        existing: IfExists,
     ) -> Result<SpdFolder, OutputError> {
         let path = path.to_owned();
         if path.symlink_metadata().is_ok() {
@@ -65,7 +65,7 @@ impl SpdFolder {
         }
         let each = schema.fields.iter().find_map(|field| field.outer.as_ref()).map_or(1, |(_, n)| *n as u64);
         let count = schema.count.saturating_mul(each);
-        if count > MOST_FILES && existing == Existing::Keep {
+        if count > MOST_FILES && existing == IfExists::Refuse {
             return Err(OutputError::ManyFiles { path, count });
         }
         let parent = existing_folder(&path)?;

@@ -1,23 +1,19 @@
 //! From what is asked for to a recipe, if it can be drawn.
 
-use rayon::prelude::*;
-
-use super::error::{TOLERABLE_FAILURE, failure};
-use super::{DEFAULT_MAX_ATTEMPTS, Intensity, Luminance, Proposal, Recipe, RecipeError};
+use super::outputs::{OutputRequest, outputs};
+use super::pilot::{TOLERABLE_FAILURE, failure, pilot};
+use super::{DEFAULT_MAX_ATTEMPTS, Intensity, ProposalKind, Recipe, RecipeError, XyzScale};
+use crate::affine::Affine;
 use crate::colorimetry;
-use crate::condition::Condition;
 use crate::cover::Cover;
-use crate::cpu::Kernel;
-use crate::dataset::Kind;
+use crate::cover::HalfSpace;
+use crate::dataset::SpectrumKind;
 use crate::model::Model;
-use crate::outputs::{Asked, outputs};
-use crate::program::{self, Affine, Bounds, Level, Program, Target};
-use crate::quantity::{Element, Layout, Quantity};
-use crate::region::{self, HalfSpace, Room};
-use crate::stream::Stream;
-
-/// How many candidates estimate the acceptance before any work starts.
-pub(super) const PILOT: u64 = 1 << 16;
+use crate::program::condition::Condition;
+use crate::program::feasibility::{self, Room};
+use crate::program::{self, Bounds, IntensityLaw, LrvTarget, Program};
+use crate::quantity::{Dtype, Layout, Quantity};
+use crate::random::stream::Stream;
 
 /// A recipe under construction.
 #[derive(Clone, Debug)]
@@ -28,9 +24,9 @@ pub struct RecipeBuilder {
     bounds: Option<Bounds>,
     covariance_scale: f64,
     intensity: Option<Intensity>,
-    proposal: Proposal,
+    proposal: ProposalKind,
     max_attempts: u32,
-    outputs: Asked,
+    outputs: OutputRequest,
 }
 
 impl RecipeBuilder {
@@ -42,9 +38,9 @@ impl RecipeBuilder {
             bounds: None,
             covariance_scale: 1.0,
             intensity: None,
-            proposal: Proposal::default(),
+            proposal: ProposalKind::default(),
             max_attempts: DEFAULT_MAX_ATTEMPTS,
-            outputs: Asked::default(),
+            outputs: OutputRequest::default(),
         }
     }
 
@@ -61,12 +57,12 @@ impl RecipeBuilder {
         self
     }
 
-    /// Spectra in 16 bits, rounded to nearest and ties to even, but never to an end of their [`Interval`]; above 65,504
+    /// Spectra in 16 bits, rounded to nearest and ties to even, but never to an end of their [`ValueRange`]; above 65,504
     /// they are infinite. Other quantities stay in 32 bits.
     ///
-    /// [`Interval`]: crate::Interval
+    /// [`ValueRange`]: crate::Interval
     pub fn half_spectra(mut self) -> Self {
-        self.outputs.spectra = Element::F16;
+        self.outputs.spectra = Dtype::F16;
         self
     }
 
@@ -76,8 +72,8 @@ impl RecipeBuilder {
         self
     }
 
-    /// The scale of an illuminant's XYZ and sRGB ([`Luminance::Absolute`]).
-    pub fn luminance(mut self, luminance: Luminance) -> Self {
+    /// The scale of an illuminant's XYZ and sRGB ([`XyzScale::Absolute`]).
+    pub fn luminance(mut self, luminance: XyzScale) -> Self {
         self.outputs.luminance = Some(luminance);
         self
     }
@@ -100,7 +96,7 @@ impl RecipeBuilder {
     /// use spectroll::{Model, Quantity, Recipe, Stream};
     ///
     /// let model = Model::builtin("munsell-vrhel")?;
-    /// let recipe = Recipe::new(&model).xyz([0.35, 0.3, 0.2]).quantities([Quantity::Xyz]).build()?;
+    /// let recipe = Recipe::builder(&model).xyz([0.35, 0.3, 0.2]).quantities([Quantity::Xyz]).build()?;
     /// let drawn = recipe.draw::<f32>(Stream::new(1), 0);
     /// assert!((drawn.values(Quantity::Xyz)[0] - 0.35).abs() < 1e-6);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -119,8 +115,8 @@ impl RecipeBuilder {
         RecipeBuilder { covariance_scale, ..self }
     }
 
-    /// Where candidates come from ([`Proposal::Auto`]).
-    pub fn proposal(self, proposal: Proposal) -> Self {
+    /// Where candidates come from ([`ProposalKind::Auto`]).
+    pub fn proposal(self, proposal: ProposalKind) -> Self {
         RecipeBuilder { proposal, ..self }
     }
 
@@ -133,7 +129,7 @@ impl RecipeBuilder {
     /// run finds enough of it.
     pub fn build(self) -> Result<Recipe, RecipeError> {
         let program = self.program()?;
-        let half_spaces = region::half_spaces(&program);
+        let half_spaces = feasibility::half_spaces(&program);
         let centre = self.centre(&program, &half_spaces)?;
         let max_attempts = program.max_attempts;
         let recipe = self.propose(program, &half_spaces, centre)?;
@@ -178,12 +174,12 @@ impl RecipeBuilder {
     /// The middle of what the rule of a program accepts; `None` where that is for the pilot run to find out.
     fn centre(&self, program: &Program, half_spaces: &[HalfSpace]) -> Result<Option<Vec<f64>>, RecipeError> {
         if let Some(target) = &program.target {
-            let largest = region::largest_lrv(program, &target.weights);
+            let largest = feasibility::largest_lrv(program, &target.weights);
             if let Some(largest) = largest.filter(|&largest| target.lrv >= largest) {
                 return Err(RecipeError::UnreachableLrv { lrv: target.lrv, largest });
             }
         }
-        match (region::room(half_spaces), self.xyz) {
+        match (feasibility::room(half_spaces), self.xyz) {
             (Room::Ball { centre, .. }, _) => Ok(Some(centre)),
             (Room::Unknown, _) => Ok(None),
             (Room::None { .. }, Some(xyz)) => {
@@ -204,9 +200,9 @@ impl RecipeBuilder {
         centre: Option<Vec<f64>>,
     ) -> Result<Recipe, RecipeError> {
         let (may_be_plain, may_be_covered) = match self.proposal {
-            Proposal::Auto => (true, true),
-            Proposal::Plain => (true, false),
-            Proposal::Cover => (false, true),
+            ProposalKind::Auto => (true, true),
+            ProposalKind::Plain => (true, false),
+            ProposalKind::Cover => (false, true),
         };
         let plain = if may_be_plain { pilot(&program) } else { 0.0 };
         if may_be_covered
@@ -228,7 +224,7 @@ impl RecipeBuilder {
 
     /// What giving the tristimulus values does to this model.
     pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
-        if self.model.kind() == Kind::Illuminant {
+        if self.model.kind() == SpectrumKind::Illuminant {
             return Err(RecipeError::XyzOfIlluminant);
         }
         if self.lrv.is_some() {
@@ -252,54 +248,54 @@ impl RecipeBuilder {
     fn nearest(&self, xyz: [f64; 3]) -> Option<[f64; 3]> {
         let weights = program::weights(&self.model, self.covariance_scale);
         let (program, map) = self.seen(&weights).ok()?;
-        let nearest = region::nearest_xyz(&program, &map, xyz)?;
+        let nearest = feasibility::nearest_xyz(&program, &map, xyz)?;
         let steps = (0..16).map(|doublings| 1e-4 * f64::from(1 << doublings)).take_while(|&part| part < 1.0);
         let inwards = |part| [0, 1, 2].map(|i| nearest[i] + part * (map.offset[i] - nearest[i]));
         let rounded = steps.map(inwards).map(|xyz| xyz.map(|v| (v * 1e4).round() / 1e4));
         let condition = self.condition(&weights).ok()?;
         rounded.into_iter().find(|&xyz| {
             let program = Program::new(&self.model, &condition.given(xyz, &weights));
-            !matches!(region::room(&region::half_spaces(&program)), Room::None { .. })
+            !matches!(feasibility::room(&feasibility::half_spaces(&program)), Room::None { .. })
                 && failure(pilot(&program), self.max_attempts) <= TOLERABLE_FAILURE
         })
     }
 
     fn brighten(&self, program: Program, intensity: Intensity) -> Result<Program, RecipeError> {
-        if self.model.kind() == Kind::Reflectance {
+        if self.model.kind() == SpectrumKind::Reflectance {
             return Err(RecipeError::IntensityOfReflectance);
         }
         let check = |value: f64| match (1e-30..1e30).contains(&value) {
             true => Ok(value),
             false => Err(RecipeError::Intensity(value)),
         };
-        let level = match intensity {
+        let law = match intensity {
             Intensity::Fixed(value) => return Ok(program.brightened(check(value)?)),
             Intensity::LogUniform(low, high) => {
                 let octaves = (check(high)? / check(low)?).log2();
                 if !(octaves > 0.0 && octaves <= 126.0) {
                     return Err(RecipeError::IntensityRange { low, high });
                 }
-                Level::LogUniform { low, octaves }
+                IntensityLaw::LogUniform { low, octaves }
             }
             Intensity::Data => match self.model.parts().powers.as_slice() {
                 [] => return Err(RecipeError::NoPowers),
-                powers => Level::OneOf(powers.iter().map(|&p| check(p)).collect::<Result<_, _>>()?),
+                powers => IntensityLaw::OneOf(powers.iter().map(|&p| check(p)).collect::<Result<_, _>>()?),
             },
         };
-        Ok(Program { level: Some(level), ..program })
+        Ok(Program { intensity: Some(law), ..program })
     }
 
-    fn target(&self, lrv: f64) -> Result<Target, RecipeError> {
+    fn target(&self, lrv: f64) -> Result<LrvTarget, RecipeError> {
         // Far below, spectra would round to 0; just below 1, to 1.
         if !(1e-30..1.0).contains(&f64::from(lrv as f32)) {
             return Err(RecipeError::Lrv(lrv));
         }
-        if self.model.kind() == Kind::Illuminant {
+        if self.model.kind() == SpectrumKind::Illuminant {
             return Err(RecipeError::LrvOfIlluminant);
         }
         let grid = self.model.grid();
         let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
-        Ok(Target { lrv, weights, bounds: self.bounds.unwrap_or_default() })
+        Ok(LrvTarget { lrv, weights, bounds: self.bounds.unwrap_or_default() })
     }
 }
 
@@ -318,13 +314,4 @@ fn check_scale(program: &Program) -> Result<(), RecipeError> {
     let low = f64::from(f32::MIN_POSITIVE);
     let is_lost = least > 0.0 && least < low;
     if is_lost { Err(RecipeError::Scale { value: least, low, high }) } else { Ok(()) }
-}
-
-/// The share of accepted candidates, of a stream of its own. In f32, as draws are made: what passes in f64 may have no
-/// room there.
-fn pilot(program: &Program) -> f64 {
-    let kernel = Kernel::<f32>::new(program);
-    let stream = Stream::named(0, "pilot");
-    let accepted = (0..PILOT).into_par_iter().filter(|&index| kernel.accepts(|b| stream.block(index, 0, b)));
-    accepted.count() as f64 / PILOT as f64
 }

@@ -1,13 +1,9 @@
 //! Why a recipe cannot be drawn.
 
-use super::builder::PILOT;
+use super::pilot::{PILOT, TOLERABLE_FAILURE, failure};
 use crate::cover::MOST_COMPONENTS;
 use crate::grid::Grid;
 use crate::quantity::Quantity;
-
-/// The probability that a draw finds no candidate within its attempts, above which a recipe is refused: one failure
-/// in a data set of 10^12 draws.
-pub(super) const TOLERABLE_FAILURE: f64 = 1e-12;
 
 /// Why a recipe cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -79,11 +75,6 @@ pub enum RecipeError {
     Pointless { setting: &'static str, needs: &'static str },
     #[error("too few candidates would be accepted: {}", hopeless(*acceptance, *max_attempts))]
     Hopeless { acceptance: f64, max_attempts: u32 },
-}
-
-/// The probability that none of `attempts` candidates is accepted.
-pub(super) fn failure(acceptance: f64, attempts: u32) -> f64 {
-    (f64::from(attempts) * (-acceptance).ln_1p()).exp()
 }
 
 fn hopeless(acceptance: f64, max_attempts: u32) -> String {

@@ -3,26 +3,27 @@
 
 mod builder;
 mod error;
+mod outputs;
+mod pilot;
 mod scalar;
 
 pub use builder::RecipeBuilder;
 pub use error::RecipeError;
-pub use scalar::{Drawn, ScalarDrawer};
+pub use scalar::{Draw, ScalarSampler};
 
 use crate::colorimetry;
-use crate::dataset::Kind;
+use crate::dataset::SpectrumKind;
 use crate::model::Model;
-use crate::program::{self, Program};
-use crate::quantity::{Format, Interval};
-use crate::real::Real;
-use crate::region;
-use crate::stream::Stream;
-use crate::wgsl::{self, TextError};
+use crate::program::{self, Program, feasibility};
+use crate::quantity::{ArrayFormat, ValueRange};
+use crate::random::real::Real;
+use crate::random::stream::Stream;
+use crate::wgsl::{self, WgslError};
 
 /// How many candidates a draw may take unless asked otherwise.
 pub const DEFAULT_MAX_ATTEMPTS: u32 = 1 << 16;
 
-/// A model, and what its draws must obey. See [`Recipe::new`].
+/// A model, and what its draws must obey. See [`Recipe::builder`].
 #[derive(Clone, Debug)]
 pub struct Recipe {
     model: Model,
@@ -35,7 +36,7 @@ pub struct Recipe {
 
 /// Where candidates come from. The draws have the same distribution either way, but are not the same draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Proposal {
+pub enum ProposalKind {
     /// Whatever is expected to cost less.
     #[default]
     Auto,
@@ -59,12 +60,12 @@ pub enum Intensity {
 
 /// The scale of an illuminant's tristimulus values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Luminance {
+pub enum XyzScale {
     /// Sums of power x colour matching function x step in nm, without the 683 lm/W of luminous units.
     #[default]
     Absolute,
     /// Y = 1.
-    One,
+    UnitY,
 }
 
 impl Recipe {
@@ -74,20 +75,20 @@ impl Recipe {
     /// use spectroll::{Bounds, Model, Recipe};
     ///
     /// let model = Model::builtin("munsell-vrhel")?;
-    /// let recipe = Recipe::new(&model).lrv(0.4).bounds(Bounds::Scaled).build()?;
+    /// let recipe = Recipe::builder(&model).lrv(0.4).bounds(Bounds::Scaled).build()?;
     /// assert!((recipe.acceptance() - 0.708).abs() < 0.01);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[allow(clippy::new_ret_no_self)] // an unchecked recipe cannot exist
-    pub fn new(model: &Model) -> RecipeBuilder {
+    pub fn builder(model: &Model) -> RecipeBuilder {
         RecipeBuilder::new(model)
     }
 
     /// The largest luminous reflectance that reflectances of a model can be scaled to and stay below 1, which none
     /// quite reaches: from a linear program. `None` of illuminants, and of a grid without visible light.
     pub fn largest_lrv(model: &Model) -> Option<f64> {
-        let weights = colorimetry::lrv_weights(model.grid()).filter(|_| model.kind() == Kind::Reflectance)?;
-        region::largest_lrv(&Program::new(model, &program::weights(model, 1.0)), &weights)
+        let weights =
+            colorimetry::lrv_weights(model.grid()).filter(|_| model.kind() == SpectrumKind::Reflectance)?;
+        feasibility::largest_lrv(&Program::new(model, &program::weights(model, 1.0)), &weights)
     }
 
     /// The model.
@@ -106,9 +107,9 @@ impl Recipe {
         self.probability
     }
 
-    /// Where candidates come from; never [`Proposal::Auto`].
-    pub fn proposal(&self) -> Proposal {
-        if self.cover.is_some() { Proposal::Cover } else { Proposal::Plain }
+    /// Where candidates come from; never [`ProposalKind::Auto`].
+    pub fn proposal(&self) -> ProposalKind {
+        if self.cover.is_some() { ProposalKind::Cover } else { ProposalKind::Plain }
     }
 
     /// How many boxes candidates are proposed from, and how many bytes their table has, where there is a cover.
@@ -117,23 +118,23 @@ impl Recipe {
     }
 
     /// What the values of its spectra are between.
-    pub fn interval(&self) -> Interval {
+    pub fn interval(&self) -> ValueRange {
         self.program.interval()
     }
 
     /// What comes out, and how it lies in memory, in the order of [`Quantity`](crate::Quantity).
-    pub fn formats(&self) -> Vec<Format> {
+    pub fn formats(&self) -> Vec<ArrayFormat> {
         self.program.outputs.iter().map(|output| output.format).collect()
     }
 
     /// Gets ready to draw one at a time, on the CPU: for a few draws, for tests, and for code that lives in `rand`.
-    pub fn scalar<R: Real>(&self) -> ScalarDrawer<R> {
-        ScalarDrawer::new(self)
+    pub fn scalar_sampler<R: Real>(&self) -> ScalarSampler<R> {
+        ScalarSampler::new(self)
     }
 
-    /// Draw `index` of a stream, as [`ScalarDrawer::draw`] makes it, which is what to use for more than one.
-    pub fn draw<R: Real>(&self, stream: Stream, index: u64) -> Drawn<R> {
-        self.scalar().draw(stream, index)
+    /// Draw `index` of a stream, as [`ScalarSampler::draw`] makes it, which is what to use for more than one.
+    pub fn draw<R: Real>(&self, stream: Stream, index: u64) -> Draw<R> {
+        self.scalar_sampler().draw(stream, index)
     }
 
     /// The draw as a WGSL module without bindings or entry points, for shaders of a host on any version of wgpu or any
@@ -153,11 +154,11 @@ impl Recipe {
     /// ```
     /// use spectroll::{Model, Quantity, Recipe};
     ///
-    /// let recipe = Recipe::new(&Model::builtin("granada")?).quantities([Quantity::Srgb]).build()?;
+    /// let recipe = Recipe::builder(&Model::builtin("granada")?).quantities([Quantity::LinearSrgb]).build()?;
     /// assert!(recipe.wgsl("lamp")?.contains("fn lamp_srgb(d: lamp_Draw) -> vec3<f32>"));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn wgsl(&self, prefix: &str) -> Result<String, TextError> {
+    pub fn wgsl(&self, prefix: &str) -> Result<String, WgslError> {
         wgsl::module(&self.program, prefix)
     }
 
@@ -178,8 +179,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_drawn_says_why() {
-        let surface = Recipe::new(&Model::builtin("munsell-vrhel").unwrap());
-        let light = Recipe::new(&Model::builtin("granada").unwrap());
+        let surface = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap());
+        let light = Recipe::builder(&Model::builtin("granada").unwrap());
         for (recipe, part) in [
             (surface.clone().lrv(f64::NAN), "NaN: it must be above 0 and below 1"),
             (surface.clone().lrv(0.0), "reflectance of 0:"),
@@ -187,7 +188,7 @@ mod tests {
             (surface.clone().covariance_scale(f64::NAN), "finite and not negative"),
             (surface.clone().max_attempts(0), "at least 1 attempt"),
             (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
-            (surface.clone().covariance_scale(1e6).proposal(Proposal::Plain), "none of 65536 was"),
+            (surface.clone().covariance_scale(1e6).proposal(ProposalKind::Plain), "none of 65536 was"),
             (surface.clone().covariance_scale(100.0).max_attempts(50), "allow at least"),
             (light.clone().lrv(0.5), "of illuminants"),
             (light.clone().xyz([0.3; 3]), "of illuminants"),
@@ -196,8 +197,8 @@ mod tests {
             (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
             (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
             (surface.clone().bounds(Bounds::Both), "without a target luminous reflectance"),
-            (surface.clone().light(&[1.0; 31]), "without XYZ or sRGB of reflectances"),
-            (surface.clone().luminance(Luminance::One).quantities([Quantity::Xyz]), "of illuminants"),
+            (surface.clone().illuminant(&[1.0; 31]), "without XYZ or sRGB of reflectances"),
+            (surface.clone().xyz_scale(XyzScale::UnitY).quantities([Quantity::Xyz]), "of illuminants"),
         ] {
             let text = message(recipe);
             assert!(text.contains(part), "{text}");
@@ -211,7 +212,7 @@ mod tests {
 
     #[test]
     fn tristimulus_values_out_of_reach_come_with_the_nearest() {
-        let surface = Recipe::new(&Model::builtin("munsell-vrhel").unwrap());
+        let surface = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap());
         for xyz in [[0.1, 0.4, 0.05], [0.9, 0.3, 0.1], [0.95, 0.99, 1.07], [0.01, 0.02, 0.6]] {
             let error = surface.clone().xyz(xyz).build().unwrap_err();
             let RecipeError::UnreachableXyz { nearest: Some(nearest), .. } = error else { panic!("{error}") };
@@ -225,7 +226,7 @@ mod tests {
         let mut parts = Model::builtin("munsell-vrhel").unwrap().parts().clone();
         parts.mean[3] = 9.0;
         parts.mean[4] = -9.0;
-        let text = message(Recipe::new(&Model::new(parts).unwrap()));
+        let text = message(Recipe::builder(&Model::new(parts).unwrap()));
         assert!(text.contains("the bounds at 430 nm, 440 nm leave no room"), "{text}");
     }
 
@@ -233,17 +234,17 @@ mod tests {
     fn values_beyond_f32_are_refused() {
         let mut parts = Model::builtin("granada").unwrap().parts().clone();
         parts.mean *= 1e35;
-        assert!(message(Recipe::new(&Model::new(parts).unwrap())).contains("where draws in f32 need"));
+        assert!(message(Recipe::builder(&Model::new(parts).unwrap())).contains("where draws in f32 need"));
     }
 
     /// Frozen, so that a changed stream is a decision and not an accident.
     #[test]
     fn the_first_draw_stays_what_it_is() {
-        let recipe = Recipe::new(&Model::builtin("munsell-vrhel").unwrap()).build().unwrap();
+        let recipe = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap()).build().unwrap();
         let drawn = recipe.draw::<f32>(Stream::new(1), 0);
-        let (spectrum, tally) = (drawn.spectrum(), drawn.tally());
+        let (spectrum, status) = (drawn.spectrum(), drawn.status());
         let ends = [spectrum[0], spectrum[15], spectrum[30]].map(f32::to_bits);
-        assert_eq!((ends, tally.attempts(), tally.above_one()), (FIRST, 1, false));
+        assert_eq!((ends, status.attempts(), status.above_one()), (FIRST, 1, false));
     }
 
     const FIRST: [u32; 3] = [1050670988, 1051942847, 1058168784];

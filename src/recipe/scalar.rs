@@ -5,10 +5,10 @@ use rand::distr::Distribution;
 
 use super::Recipe;
 use crate::cpu::Kernel;
-use crate::program::Tally;
+use crate::draw_status::DrawStatus;
 use crate::quantity::Quantity;
-use crate::real::Real;
-use crate::stream::Stream;
+use crate::random::real::Real;
+use crate::random::stream::Stream;
 
 /// Draws of a recipe, one at a time: in f32 as every engine makes them, in f64 without their rounding errors. See
 /// [`Recipe::scalar`].
@@ -18,37 +18,37 @@ use crate::stream::Stream;
 ///
 /// ```
 /// use rand::distr::Distribution;
-/// use spectroll::{Drawn, Model, Recipe, Stream};
+/// use spectroll::{Draw, Model, Recipe, Stream};
 ///
-/// let daylights = Recipe::new(&Model::builtin("granada")?).build()?.scalar::<f32>();
-/// let ten: Vec<Drawn<f32>> = daylights.sample_iter(Stream::new(7).rng()).take(10).collect();
-/// assert!(ten.iter().flat_map(Drawn::spectrum).all(|&power| power > 0.0));
+/// let daylights = Recipe::builder(&Model::builtin("granada")?).build()?.scalar_sampler::<f32>();
+/// let ten: Vec<Draw<f32>> = daylights.sample_iter(Stream::new(7).rng()).take(10).collect();
+/// assert!(ten.iter().flat_map(Draw::spectrum).all(|&power| power > 0.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct ScalarDrawer<R> {
+pub struct ScalarSampler<R> {
     kernel: Kernel<R>,
     quantities: Vec<Quantity>,
 }
 
-impl<R: Real> ScalarDrawer<R> {
-    pub(super) fn new(recipe: &Recipe) -> ScalarDrawer<R> {
+impl<R: Real> ScalarSampler<R> {
+    pub(super) fn new(recipe: &Recipe) -> ScalarSampler<R> {
         let program = recipe.program();
         let quantities = program.outputs.iter().map(|output| output.format.quantity).collect();
-        ScalarDrawer { kernel: Kernel::new(program), quantities }
+        ScalarSampler { kernel: Kernel::new(program), quantities }
     }
 
     /// Draw `index` of a stream.
-    pub fn draw(&self, stream: Stream, index: u64) -> Drawn<R> {
+    pub fn draw(&self, stream: Stream, index: u64) -> Draw<R> {
         self.drawn(self.kernel.draw(stream, index))
     }
 
-    fn drawn(&self, (values, tally): (Vec<Vec<R>>, Tally)) -> Drawn<R> {
-        Drawn { tally, values: self.quantities.iter().copied().zip(values).collect() }
+    fn drawn(&self, (values, status): (Vec<Vec<R>>, DrawStatus)) -> Draw<R> {
+        Draw { status, values: self.quantities.iter().copied().zip(values).collect() }
     }
 }
 
-impl<R: Real> Distribution<Drawn<R>> for ScalarDrawer<R> {
-    fn sample<G: Rng + ?Sized>(&self, rng: &mut G) -> Drawn<R> {
+impl<R: Real> Distribution<Draw<R>> for ScalarSampler<R> {
+    fn sample<G: Rng + ?Sized>(&self, rng: &mut G) -> Draw<R> {
         // A recipe that could go on here for long could not be built.
         let mut attempts = 1..=u32::MAX;
         let drawn =
@@ -59,19 +59,19 @@ impl<R: Real> Distribution<Drawn<R>> for ScalarDrawer<R> {
 
 /// One draw.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drawn<R> {
-    tally: Tally,
+pub struct Draw<R> {
+    status: DrawStatus,
     values: Vec<(Quantity, Vec<R>)>,
 }
 
-impl<R> Drawn<R> {
+impl<R> Draw<R> {
     /// What it took.
-    pub fn tally(&self) -> Tally {
-        self.tally
+    pub fn status(&self) -> DrawStatus {
+        self.status
     }
 
     /// The values of a quantity, all 0 where the draw failed. None for [`Quantity::Attempts`], which
-    /// [`Drawn::tally`] has, nor for what the recipe does not ask for.
+    /// [`Draw::status`] has, nor for what the recipe does not ask for.
     pub fn values(&self, quantity: Quantity) -> &[R] {
         self.values.iter().find(|(q, _)| *q == quantity).map_or(&[], |(_, values)| values)
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::dataset::{DatasetError, Kind};
+use crate::dataset::{DatasetError, SpectrumKind};
 use crate::grid::{Grid, GridError};
 use crate::model::ModelError;
 use crate::recipe::RecipeError;
@@ -11,13 +11,13 @@ use crate::recipe::RecipeError;
 #[derive(Debug, thiserror::Error)]
 #[error("{place}: {problem}")]
 pub struct SceneError {
-    place: Place,
-    problem: Box<Problem>,
+    place: SceneErrorPlace,
+    problem: Box<SceneErrorKind>,
 }
 
 /// Where something is wrong.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct SceneErrorPlace {
     /// The file, where there is one.
     pub file: Option<String>,
     /// The line in it, from 1.
@@ -32,7 +32,7 @@ pub struct Place {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
-pub enum Problem {
+pub enum SceneErrorKind {
     #[error("cannot read it: {0}")]
     Read(std::io::Error),
     #[error("this is not TOML: {0}")]
@@ -44,7 +44,7 @@ pub enum Problem {
     #[error("this is {found}, and it takes {expected}")]
     Type { expected: &'static str, found: String },
     #[error("there is no {found:?}{}; there are {known}", meant(suggestion))]
-    Choice { found: String, suggestion: Option<String>, known: String },
+    EngineChoice { found: String, suggestion: Option<String>, known: String },
     #[error("{with:?} says the same in another way: keep one of the two")]
     Both { with: &'static str },
     #[error("it means nothing {with}: leave it out")]
@@ -72,7 +72,7 @@ pub enum Problem {
     #[error(transparent)]
     Model(ModelError),
     #[error("this model is of {found}s, and the group is of {wanted}s: choose another model")]
-    Kind { found: Kind, wanted: Kind },
+    SpectrumKind { found: SpectrumKind, wanted: SpectrumKind },
     #[error("the model is on {model} nm, and the scene on {scene} nm: {}", same_grid(*model))]
     Grid { model: Grid, scene: Grid },
     #[error(transparent)]
@@ -88,7 +88,7 @@ pub enum Problem {
     #[error("{0}: every level must be above 0 and below 1, where 1 is a perfect white")]
     Level(f64),
     #[error("{0} levels: it takes 1 to 10000")]
-    Levels(u64),
+    LrvLevels(u64),
     #[error("from {from} to {to}: the first must be below the second")]
     Order { from: f64, to: f64 },
     #[error("{from} to {to}: {what} is between 0 and 1, and the first no more than the second")]
@@ -115,38 +115,38 @@ pub(super) struct Fault {
     /// The number of the group.
     pub(super) group: Option<usize>,
     pub(super) key: &'static str,
-    pub(super) problem: Problem,
+    pub(super) problem: SceneErrorKind,
 }
 
 impl Fault {
     /// A problem of the scene as a whole.
-    pub(super) fn of_scene(key: &'static str, problem: Problem) -> Fault {
+    pub(super) fn of_scene(key: &'static str, problem: SceneErrorKind) -> Fault {
         Fault { group: None, key, problem }
     }
 
     /// A problem of a group.
-    pub(super) fn of_group(group: usize, key: &'static str, problem: Problem) -> Fault {
+    pub(super) fn of_group(group: usize, key: &'static str, problem: SceneErrorKind) -> Fault {
         Fault { group: Some(group), key, problem }
     }
 }
 
 impl SceneError {
-    pub(super) fn new(place: Place, problem: Problem) -> SceneError {
+    pub(super) fn new(place: SceneErrorPlace, problem: SceneErrorKind) -> SceneError {
         SceneError { place, problem: Box::new(problem) }
     }
 
     /// Where something is wrong.
-    pub fn place(&self) -> &Place {
+    pub fn place(&self) -> &SceneErrorPlace {
         &self.place
     }
 
     /// What is wrong there.
-    pub fn problem(&self) -> &Problem {
+    pub fn problem(&self) -> &SceneErrorKind {
         &self.problem
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for SceneErrorPlace {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         if let Some(file) = &self.file {
             write!(f, "{file}")?;

@@ -9,13 +9,15 @@ use toml::de::DeTable;
 
 use crate::colorimetry;
 use crate::dataset::{Dataset, DatasetError, Table};
-use crate::grid::Extend;
+use crate::grid::Extrapolation;
 use crate::model::Model;
 use crate::program::Bounds;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
 
-use super::error::{Place, Problem, SceneError, closest};
-use super::group::{Aim, Base, Copies, Group, Hue, Illuminants, Levels, Sharing, Surfaces, Targets};
+use super::error::{SceneError, SceneErrorKind, SceneErrorPlace, closest};
+use super::group::{
+    Base, Copies, Group, Hue, Illuminants, IntensityScope, LrvLevels, Surfaces, TargetConstraint, Targets,
+};
 use super::reader::{Entry, Section, Wrong};
 use super::{Scene, SceneBuilder};
 
@@ -38,8 +40,8 @@ impl Scene {
     pub fn open(path: &Path) -> Result<Scene, SceneError> {
         let name = path.display().to_string();
         let text = fs::read_to_string(path).map_err(|e| {
-            let place = Place { file: Some(name.clone()), ..Place::default() };
-            SceneError::new(place, Problem::Read(e))
+            let place = SceneErrorPlace { file: Some(name.clone()), ..SceneErrorPlace::default() };
+            SceneError::new(place, SceneErrorKind::Read(e))
         })?;
         Scene::parse(&name, &text, path.parent().unwrap_or(Path::new("")))
     }
@@ -58,10 +60,10 @@ impl Scene {
     pub fn parse(name: &str, text: &str, folder: &Path) -> Result<Scene, SceneError> {
         let error = |span: Option<Range<usize>>, group: Option<String>, key: String, problem| {
             let line = span.map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
-            SceneError::new(Place { file: Some(name.to_owned()), line, group, key }, problem)
+            SceneError::new(SceneErrorPlace { file: Some(name.to_owned()), line, group, key }, problem)
         };
         let table = DeTable::parse(text).map_err(|e| {
-            error(e.span(), None, String::new(), Problem::Syntax(e.message().replace('\n', "; ")))
+            error(e.span(), None, String::new(), SceneErrorKind::Syntax(e.message().replace('\n', "; ")))
         })?;
         let file = Reader { folder, models: HashMap::new() }
             .scene(table.get_ref())
@@ -107,12 +109,12 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn scene(&mut self, table: &DeTable) -> Result<File, Wrong> {
         let section = Section::new(table, 0..0, "", &SCENE)?;
-        let mut builder = Scene::new(section.need("scenes", "scenes = 1000")?.whole()?);
+        let mut builder = Scene::builder(section.need("scenes", "scenes = 1000")?.whole()?);
         if let Some(entry) = section.get("seed") {
             builder = builder.seed(entry.whole()?);
         }
         if let Some(entry) = section.get("wavelengths") {
-            let grid = entry.text()?.parse().map_err(|e| entry.wrong(Problem::Wavelengths(e)))?;
+            let grid = entry.text()?.parse().map_err(|e| entry.wrong(SceneErrorKind::Wavelengths(e)))?;
             builder = builder.wavelengths(grid);
         }
         let mut groups = Vec::new();
@@ -152,29 +154,33 @@ impl Reader<'_> {
         let given: Vec<_> =
             ["lrv", "xyz", "hue"].into_iter().filter_map(|key| Some((key, section.get(key)?))).collect();
         if let [(first, _), (_, second), ..] = given.as_slice() {
-            return Err(second.wrong(Problem::Both { with: first }));
+            return Err(second.wrong(SceneErrorKind::Both { with: first }));
         }
         let aim = match (given.first(), flat) {
-            (None, true) => Aim::Flat(Levels::Uniform(0.0, 1.0)),
-            (Some(("lrv", entry)), true) => Aim::Flat(levels(entry)?),
-            (Some(("lrv", entry)), false) => Aim::Lrv(levels(entry)?),
-            (Some((_, entry)), true) => return Err(entry.wrong(Problem::Both { with: "flat" })),
-            (Some(("xyz", entry)), _) => Aim::Xyz(entry.numbers("three numbers, as in [0.3, 0.3, 0.3]")?),
-            (Some((_, entry)), _) => Aim::Hue(hue(entry)?),
+            (None, true) => TargetConstraint::Flat(LrvLevels::Uniform(0.0, 1.0)),
+            (Some(("lrv", entry)), true) => TargetConstraint::Flat(levels(entry)?),
+            (Some(("lrv", entry)), false) => TargetConstraint::Lrv(levels(entry)?),
+            (Some((_, entry)), true) => return Err(entry.wrong(SceneErrorKind::Both { with: "flat" })),
+            (Some(("xyz", entry)), _) => {
+                TargetConstraint::Xyz(entry.numbers("three numbers, as in [0.3, 0.3, 0.3]")?)
+            }
+            (Some((_, entry)), _) => TargetConstraint::Hue(hue(entry)?),
             (None, false) => {
                 let example = "lrv = 0.4, lrv = { from = 0.2, to = 0.6, levels = 10 }, xyz, hue or flat = true; \
                                reflectances with nothing given are a [[surface]]";
-                return Err(section.wrong("lrv", Problem::Missing { example }));
+                return Err(section.wrong("lrv", SceneErrorKind::Missing { example }));
             }
         };
         let base = self.base(section, Some((1, flat)))?;
         let bounds = section.get("bounds");
-        if let Some(entry) = bounds.as_ref().filter(|_| !matches!(aim, Aim::Lrv(_))) {
+        if let Some(entry) = bounds.as_ref().filter(|_| !matches!(aim, TargetConstraint::Lrv(_))) {
             let with = match aim {
-                Aim::Flat(_) => "for a flat target, which is the same in every band and never out of bounds",
+                TargetConstraint::Flat(_) => {
+                    "for a flat target, which is the same in every band and never out of bounds"
+                }
                 _ => "without an lrv: a spectrum of given tristimulus values is not scaled",
             };
-            return Err(entry.wrong(Problem::Pointless { with }));
+            return Err(entry.wrong(SceneErrorKind::Pointless { with }));
         }
         let names = [("base", Bounds::Base), ("scaled", Bounds::Scaled), ("both", Bounds::Both)];
         let bounds = bounds.map_or(Ok(Bounds::default()), |entry| entry.choice(&names))?;
@@ -219,9 +225,9 @@ impl Reader<'_> {
             Model::load(&path)
         } else {
             let suggestion = closest(name, Model::BUILTIN);
-            return Err(entry.wrong(Problem::NoModel { name: name.to_owned(), suggestion }));
+            return Err(entry.wrong(SceneErrorKind::NoModel { name: name.to_owned(), suggestion }));
         };
-        let model = model.map_err(|e| entry.wrong(Problem::Model(e)))?;
+        let model = model.map_err(|e| entry.wrong(SceneErrorKind::Model(e)))?;
         self.models.insert(name.to_owned(), model.clone());
         Ok(model)
     }
@@ -234,11 +240,11 @@ impl Reader<'_> {
             "flat" => return Ok(vec![1.0; grid.len()]),
             path => Table::open(&self.folder.join(path), None),
         };
-        let wrong = |e: DatasetError| entry.wrong(Problem::Mean(e));
-        let data = Dataset::new(&[table.map_err(wrong)?], grid, Extend::Error).map_err(wrong)?;
+        let wrong = |e: DatasetError| entry.wrong(SceneErrorKind::Mean(e));
+        let data = Dataset::new(&[table.map_err(wrong)?], grid, Extrapolation::Error).map_err(wrong)?;
         match data.spectra().ncols() {
             1 => Ok(data.spectra().column(0).iter().copied().collect()),
-            found => Err(entry.wrong(Problem::Means { found })),
+            found => Err(entry.wrong(SceneErrorKind::Means { found })),
         }
     }
 }
@@ -257,59 +263,61 @@ fn range(entry: &Entry) -> Result<(f64, f64), Wrong> {
     Ok((from, to))
 }
 
-fn intensity(entry: &Entry) -> Result<(Intensity, Sharing), Wrong> {
+fn intensity(entry: &Entry) -> Result<(Intensity, IntensityScope), Wrong> {
     let Some(section) = entry.section(&["log_uniform", "from_data", "shared"]).transpose()? else {
         let expected = "a number, { log_uniform = [0.15, 150] } or { from_data = true }";
         let number = entry.number().map_err(|wrong| wrong.expecting(expected))?;
-        return Ok((Intensity::Fixed(number), Sharing::Scene));
+        return Ok((Intensity::Fixed(number), IntensityScope::Scene));
     };
-    let sharing = if flag(&section, "shared")? { Sharing::Scene } else { Sharing::Each };
+    let scope = if flag(&section, "shared")? { IntensityScope::Scene } else { IntensityScope::Light };
     match (section.get("log_uniform"), section.get("from_data")) {
-        (Some(_), Some(data)) => Err(data.wrong(Problem::Both { with: "log_uniform" })),
+        (Some(_), Some(data)) => Err(data.wrong(SceneErrorKind::Both { with: "log_uniform" })),
         (Some(entry), None) => {
             let (low, high) = range(&entry)?;
-            Ok((Intensity::LogUniform(low, high), sharing))
+            Ok((Intensity::LogUniform(low, high), scope))
         }
-        (None, Some(entry)) if entry.flag()? => Ok((Intensity::Data, sharing)),
+        (None, Some(entry)) if entry.flag()? => Ok((Intensity::Data, scope)),
         _ => Err(section.wrong(
             "",
-            Problem::Missing { example: "intensity = { log_uniform = [0.15, 150] } or { from_data = true }" },
+            SceneErrorKind::Missing {
+                example: "intensity = { log_uniform = [0.15, 150] } or { from_data = true }",
+            },
         )),
     }
 }
 
-fn levels(entry: &Entry) -> Result<Levels, Wrong> {
+fn levels(entry: &Entry) -> Result<LrvLevels, Wrong> {
     if let Some(list) = entry.list().transpose()? {
-        return Ok(Levels::Each(list));
+        return Ok(LrvLevels::Each(list));
     }
     let Some(section) = entry.section(&["from", "to", "levels", "uniform"]).transpose()? else {
         let expected = "a number, a list, { from = 0.2, to = 0.6, levels = 10 } or { uniform = [0.2, 0.6] }";
-        return entry.number().map(Levels::from).map_err(|wrong| wrong.expecting(expected));
+        return entry.number().map(LrvLevels::from).map_err(|wrong| wrong.expecting(expected));
     };
     if let Some(uniform) = section.get("uniform") {
         if let Some(other) = ["from", "to", "levels"].into_iter().find_map(|key| section.get(key)) {
-            return Err(other.wrong(Problem::Both { with: "uniform" }));
+            return Err(other.wrong(SceneErrorKind::Both { with: "uniform" }));
         }
         let (from, to) = range(&uniform)?;
-        return Ok(Levels::Uniform(from, to));
+        return Ok(LrvLevels::Uniform(from, to));
     }
     let from = section.need("from", "{ from = 0.2, to = 0.6, levels = 10 }")?.number()?;
     let to = section.need("to", "{ from = 0.2, to = 0.6, levels = 10 }")?.number()?;
     let count = section.need("levels", "{ from = 0.2, to = 0.6, levels = 10 }")?;
     let levels = count.whole()?;
     if !(1..=10_000).contains(&levels) {
-        return Err(count.wrong(Problem::Levels(levels)));
+        return Err(count.wrong(SceneErrorKind::LrvLevels(levels)));
     }
     if levels > 1 && from >= to {
-        return Err(entry.wrong(Problem::Order { from, to }));
+        return Err(entry.wrong(SceneErrorKind::Order { from, to }));
     }
-    Ok(Levels::even(from, to, levels as u32))
+    Ok(LrvLevels::even(from, to, levels as u32))
 }
 
 fn hue(entry: &Entry) -> Result<Hue, Wrong> {
     const EXAMPLE: &str = "hue = { levels = 10, saturation = [0.2, 0.6], lightness = [0.2, 0.6] }";
     let Some(section) = entry.section(&["levels", "saturation", "lightness"]).transpose()? else {
-        return Err(entry.wrong(Problem::Missing { example: EXAMPLE }));
+        return Err(entry.wrong(SceneErrorKind::Missing { example: EXAMPLE }));
     };
     let levels = section.need("levels", EXAMPLE)?.whole()?;
     let saturation = range(&section.need("saturation", EXAMPLE)?)?;

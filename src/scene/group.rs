@@ -20,7 +20,7 @@ pub(super) struct Base {
 pub struct Illuminants {
     pub(super) base: Base,
     pub(super) fixed: bool,
-    pub(super) intensity: Option<(Intensity, Sharing)>,
+    pub(super) intensity: Option<(Intensity, IntensityScope)>,
     pub(super) mean: Option<Vec<f64>>,
     pub(super) same_shape: bool,
 }
@@ -36,7 +36,7 @@ pub struct Surfaces {
 #[derive(Clone, Debug)]
 pub struct Targets {
     pub(super) base: Base,
-    pub(super) aim: Aim,
+    pub(super) aim: TargetConstraint,
     pub(super) bounds: Bounds,
     pub(super) copies: Copies,
 }
@@ -54,30 +54,30 @@ pub enum Group {
 
 /// Whose an intensity is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sharing {
+pub enum IntensityScope {
     /// Each light has its own.
-    Each,
+    Light,
     /// The lights of a scene have the same.
     Scene,
 }
 
 /// What is given of a target.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Aim {
+pub enum TargetConstraint {
     /// The luminous reflectance value (LRV), to which the spectrum is scaled (eq. 9, 10).
-    Lrv(Levels),
+    Lrv(LrvLevels),
     /// The tristimulus values under D65, where a perfect white has Y = 1: see
     /// [`RecipeBuilder::xyz`](crate::RecipeBuilder::xyz).
     Xyz([f64; 3]),
     /// The same, by hue.
     Hue(Hue),
     /// All: the spectrum is its LRV in every band.
-    Flat(Levels),
+    Flat(LrvLevels),
 }
 
 /// Luminous reflectance values.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Levels {
+pub enum LrvLevels {
     /// These in turn: scene s has number s modulo how many there are.
     Each(Vec<f64>),
     /// For each target its own, uniform between these.
@@ -109,33 +109,33 @@ pub enum Copies {
     SameShape,
 }
 
-impl Levels {
+impl LrvLevels {
     /// `levels` values at equal steps, `from` and `to` included.
-    pub fn even(from: f64, to: f64, levels: u32) -> Levels {
+    pub fn even(from: f64, to: f64, levels: u32) -> LrvLevels {
         let step = (to - from) / f64::from(levels.saturating_sub(1).max(1));
-        Levels::Each((0..levels).map(|level| from + step * f64::from(level)).collect())
+        LrvLevels::Each((0..levels).map(|level| from + step * f64::from(level)).collect())
     }
 
     /// That of a scene, where `uniform` is between 0 and 1.
     pub(super) fn at(&self, scene: u64, uniform: impl FnOnce() -> f64) -> f64 {
         match self {
-            Levels::Each(levels) => levels[(scene % levels.len() as u64) as usize],
-            Levels::Uniform(low, high) => low + (high - low) * uniform(),
+            LrvLevels::Each(levels) => levels[(scene % levels.len() as u64) as usize],
+            LrvLevels::Uniform(low, high) => low + (high - low) * uniform(),
         }
     }
 
     /// The largest.
     pub(super) fn largest(&self) -> f64 {
         match self {
-            Levels::Each(levels) => levels.iter().fold(0.0, |a: f64, &b| a.max(b)),
-            Levels::Uniform(_, to) => *to,
+            LrvLevels::Each(levels) => levels.iter().fold(0.0, |a: f64, &b| a.max(b)),
+            LrvLevels::Uniform(_, to) => *to,
         }
     }
 }
 
-impl From<f64> for Levels {
-    fn from(level: f64) -> Levels {
-        Levels::Each(vec![level])
+impl From<f64> for LrvLevels {
+    fn from(level: f64) -> LrvLevels {
+        LrvLevels::Each(vec![level])
     }
 }
 
@@ -180,8 +180,8 @@ impl Illuminants {
     }
 
     /// Multiplies the lights.
-    pub fn intensity(self, intensity: Intensity, sharing: Sharing) -> Self {
-        Illuminants { intensity: Some((intensity, sharing)), ..self }
+    pub fn intensity(self, intensity: Intensity, scope: IntensityScope) -> Self {
+        Illuminants { intensity: Some((intensity, scope)), ..self }
     }
 
     /// Replaces the mean spectrum of the model by this, a value a band in any unit: it is scaled to the mean power of
@@ -210,15 +210,20 @@ impl Surfaces {
 
 impl Targets {
     /// One target a scene, drawn from a model.
-    pub fn new(name: &str, model: &Model, aim: Aim) -> Targets {
+    pub fn new(name: &str, model: &Model, aim: TargetConstraint) -> Targets {
         let base = Base::new(name, Some(model), 1);
         Targets { base, aim, bounds: Bounds::default(), copies: Copies::default() }
     }
 
     /// One target a scene, the same in every band.
-    pub fn flat(name: &str, levels: Levels) -> Targets {
+    pub fn flat(name: &str, levels: LrvLevels) -> Targets {
         let base = Base::new(name, None, 1);
-        Targets { base, aim: Aim::Flat(levels), bounds: Bounds::default(), copies: Copies::default() }
+        Targets {
+            base,
+            aim: TargetConstraint::Flat(levels),
+            bounds: Bounds::default(),
+            copies: Copies::default(),
+        }
     }
 
     /// `count` targets a scene.

@@ -1,7 +1,7 @@
 //! Scenes: groups of lights, surfaces and targets that are drawn together, scene by scene.
 //!
 //! A [`Scene`] says what a data set of scenes has in each of them, in code or from a file ([`Scene::open`]). It is
-//! checked as a whole when it is made, and what holds one can be drawn, by an engine ([`Scene::drawer`]) or in a host's
+//! checked as a whole when it is made, and what holds one can be drawn, by an engine ([`Scene::session`]) or in a host's
 //! encoder ([`SceneSampler`]).
 //!
 //! What an element of a group is depends on the seed, the name of the group, the number of the scene and that of the
@@ -13,22 +13,22 @@
 //! and no shader is compiled for them.
 //!
 //! ```
-//! use spectroll::scene::{Aim, Illuminants, Levels, Scene, Sharing, Surfaces, Targets};
-//! use spectroll::{Bounds, Choice, Engine, EngineError, Intensity, Model};
+//! use spectroll::scene::{TargetConstraint, Illuminants, LrvLevels, Scene, IntensityScope, Surfaces, Targets};
+//! use spectroll::{Bounds, EngineChoice, Engine, EngineError, Intensity, Model};
 //!
 //! let (daylight, surfaces) = (Model::builtin("granada")?, Model::builtin("munsell-vrhel")?);
 //! let lights = Illuminants::new("lights", &daylight, 3);
-//! let scene = Scene::new(3000)
+//! let scene = Scene::builder(3000)
 //!     .seed(1)
-//!     .group(lights.intensity(Intensity::LogUniform(0.15, 150.0), Sharing::Scene))
+//!     .group(lights.intensity(Intensity::LogUniform(0.15, 150.0), IntensityScope::Scene))
 //!     .group(Surfaces::new("background", &surfaces, 999))
 //!     .group(
-//!         Targets::new("target", &surfaces, Aim::Lrv(Levels::even(0.2, 0.6, 10))).bounds(Bounds::Scaled),
+//!         Targets::new("target", &surfaces, TargetConstraint::Lrv(LrvLevels::even(0.2, 0.6, 10))).bounds(Bounds::Scaled),
 //!     )
 //!     .build()?;
 //!
-//! let engine = Engine::new(&Choice::Cpu)?;
-//! scene.drawer(&engine)?.draw(0..4, |window| {
+//! let engine = Engine::new(&EngineChoice::Cpu)?;
+//! scene.session(&engine)?.draw(0..4, |window| {
 //!     let background = window.values("background"); // (scene, surface, band)
 //!     let scenes = (window.scenes.end - window.scenes.start) as usize;
 //!     assert_eq!(background.len(), scenes * 999 * 31);
@@ -37,29 +37,31 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod aim;
-mod cast;
-mod draw;
 mod error;
 mod file;
 mod group;
-mod outline;
+mod plan;
 mod reader;
-mod record;
+mod sampler;
+mod session;
+mod target;
+mod workload;
 
 use crate::grid::Grid;
 use crate::model::Model;
-use crate::stream::Stream;
+use crate::random::stream::Stream;
 
-use cast::Cast;
-pub use cast::{Array, Content, Role};
-pub use draw::{GroupSummary, SceneDrawer, Window};
 use error::{Fault, MAX_COUNT, MAX_DRAWS};
-pub use error::{Place, Problem, SceneError};
+pub use error::{SceneError, SceneErrorKind, SceneErrorPlace};
 pub use file::PRESETS;
-pub use group::{Aim, Copies, Group, Hue, Illuminants, Levels, Sharing, Surfaces, Targets};
-pub use outline::{GroupOutline, Outline};
-pub use record::{PreparedScene, SceneSampler};
+pub use group::{
+    Copies, Group, Hue, Illuminants, IntensityScope, LrvLevels, Surfaces, TargetConstraint, Targets,
+};
+use plan::GroupPlan;
+pub use plan::{Array, GroupKind};
+pub use sampler::{PreparedScene, SceneSampler};
+pub use session::{GroupSummary, SceneSession, Window};
+pub use workload::{GroupWorkload, Workload};
 
 /// What data sets call arrays that are not a group's, in one format or another.
 const RESERVED: [&str; 7] = ["wavelength", "wavelengths", "attributes", "X", "S_X", "data", "comment"];
@@ -69,10 +71,10 @@ pub struct Scene {
     scenes: u64,
     seed: u64,
     grid: Grid,
-    casts: Vec<Cast>,
+    plans: Vec<GroupPlan>,
 }
 
-/// A scene under construction. See [`Scene::new`].
+/// A scene under construction. See [`Scene::builder`].
 #[derive(Clone, Debug)]
 pub struct SceneBuilder {
     scenes: u64,
@@ -83,8 +85,7 @@ pub struct SceneBuilder {
 
 impl Scene {
     /// Starts a data set of so many scenes, with nothing in them. [`SceneBuilder::build`] ends it.
-    #[allow(clippy::new_ret_no_self)] // an unchecked scene cannot exist
-    pub fn new(scenes: u64) -> SceneBuilder {
+    pub fn builder(scenes: u64) -> SceneBuilder {
         SceneBuilder { scenes, seed: 0, wavelengths: None, groups: Vec::new() }
     }
 
@@ -105,12 +106,12 @@ impl Scene {
 
     /// The names of the groups.
     pub fn groups(&self) -> impl Iterator<Item = &str> {
-        self.casts.iter().map(|cast| cast.name.as_str())
+        self.plans.iter().map(|plan| plan.name.as_str())
     }
 
     /// Every array, group by group.
     pub fn arrays(&self) -> impl Iterator<Item = &Array> {
-        self.casts.iter().flat_map(|cast| &cast.arrays)
+        self.plans.iter().flat_map(|plan| &plan.arrays)
     }
 
     /// The scene with one of its groups alone, whose draws stay what they are; `None` where there is no such group.
@@ -120,14 +121,14 @@ impl Scene {
 
     /// The scene with those of its groups that are wanted, whose draws stay what they are; `None` where none is.
     pub fn keep(mut self, wanted: impl Fn(&str) -> bool) -> Option<Scene> {
-        self.casts.retain(|cast| wanted(&cast.name));
-        (!self.casts.is_empty()).then_some(self)
+        self.plans.retain(|plan| wanted(&plan.name));
+        (!self.plans.is_empty()).then_some(self)
     }
 
     /// The names of the groups that are drawn from a model, with that model: with the group's own mean where it has
     /// one.
     pub fn models(&self) -> impl Iterator<Item = (&str, &Model)> {
-        self.casts.iter().filter_map(|cast| Some((cast.name.as_str(), cast.model.as_ref()?)))
+        self.plans.iter().filter_map(|plan| Some((plan.name.as_str(), plan.model.as_ref()?)))
     }
 }
 
@@ -152,7 +153,7 @@ impl SceneBuilder {
     pub fn build(self) -> Result<Scene, SceneError> {
         self.checked().map_err(|fault| {
             let group = fault.group.map(|group| self.groups[group].base().name.clone());
-            let place = Place { group, key: fault.key.to_owned(), ..Place::default() };
+            let place = SceneErrorPlace { group, key: fault.key.to_owned(), ..SceneErrorPlace::default() };
             SceneError::new(place, fault.problem)
         })
     }
@@ -160,10 +161,10 @@ impl SceneBuilder {
     /// The scene, or what is wrong with it and whose it is.
     fn checked(&self) -> Result<Scene, Fault> {
         if !(1..=1 << 32).contains(&self.scenes) {
-            return Err(Fault::of_scene("scenes", Problem::Scenes(self.scenes)));
+            return Err(Fault::of_scene("scenes", SceneErrorKind::Scenes(self.scenes)));
         }
         if self.groups.is_empty() {
-            return Err(Fault::of_scene("", Problem::NoGroups));
+            return Err(Fault::of_scene("", SceneErrorKind::NoGroups));
         }
         for (number, group) in self.groups.iter().enumerate() {
             let name = &group.base().name;
@@ -172,22 +173,22 @@ impl SceneBuilder {
             let is_name = letters.next().is_some_and(|c| c.is_ascii_alphabetic())
                 && letters.all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
             if !is_name {
-                return fault("name", Problem::Name(name.clone()));
+                return fault("name", SceneErrorKind::Name(name.clone()));
             }
             if RESERVED.contains(&name.as_str()) {
-                return fault("name", Problem::Reserved(name.clone()));
+                return fault("name", SceneErrorKind::Reserved(name.clone()));
             }
             let id = |name: &str| Stream::named(0, name).id();
             for other in self.groups[..number].iter().map(|other| &other.base().name) {
                 if other == name {
-                    return fault("name", Problem::SameName(name.clone()));
+                    return fault("name", SceneErrorKind::SameName(name.clone()));
                 }
                 if id(other) == id(name) {
-                    return fault("name", Problem::SameStream(other.clone()));
+                    return fault("name", SceneErrorKind::SameStream(other.clone()));
                 }
             }
             if !(1..=MAX_COUNT).contains(&group.base().count) {
-                return fault("count", Problem::Count(group.base().count));
+                return fault("count", SceneErrorKind::Count(group.base().count));
             }
         }
         let each = |group: &&Group| match group {
@@ -198,24 +199,24 @@ impl SceneBuilder {
         let per_scene = self.groups.iter().filter(each).map(|group| group.base().count as f64).sum::<f64>();
         let draws = per_scene * self.scenes as f64;
         if draws > MAX_DRAWS {
-            return Err(Fault::of_scene("scenes", Problem::Draws { draws }));
+            return Err(Fault::of_scene("scenes", SceneErrorKind::Draws { draws }));
         }
         let grid = self.wavelengths.or_else(|| {
             let mut models = self.groups.iter().filter_map(|group| group.base().model.as_ref());
             models.next().map(|model| model.grid())
         });
         let grid = grid.unwrap_or(Grid::DEFAULT);
-        let casts = self.groups.iter().enumerate();
-        let casts: Vec<_> =
-            casts.map(|(i, group)| Cast::new(i, group, grid, self.seed)).collect::<Result<_, _>>()?;
-        let names = |cast: &'_ Cast| cast.arrays.iter().map(|a| a.name.clone()).collect::<Vec<_>>();
-        for (number, cast) in casts.iter().enumerate() {
+        let plans = self.groups.iter().enumerate();
+        let plans: Vec<_> =
+            plans.map(|(i, group)| GroupPlan::new(i, group, grid, self.seed)).collect::<Result<_, _>>()?;
+        let names = |plan: &'_ GroupPlan| plan.arrays.iter().map(|a| a.name.clone()).collect::<Vec<_>>();
+        for (number, plan) in plans.iter().enumerate() {
             let clash =
-                casts[..number].iter().find(|other| names(other).iter().any(|n| names(cast).contains(n)));
+                plans[..number].iter().find(|other| names(other).iter().any(|n| names(plan).contains(n)));
             if let Some(other) = clash {
-                return Err(Fault::of_group(number, "name", Problem::SameArray(other.name.clone())));
+                return Err(Fault::of_group(number, "name", SceneErrorKind::SameArray(other.name.clone())));
             }
         }
-        Ok(Scene { scenes: self.scenes, seed: self.seed, grid, casts })
+        Ok(Scene { scenes: self.scenes, seed: self.seed, grid, plans })
     }
 }

@@ -8,7 +8,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Problem, closest};
+use super::error::{SceneErrorKind, closest};
 
 /// Something wrong with a key.
 #[derive(Debug)]
@@ -18,13 +18,13 @@ pub(super) struct Wrong {
     /// The name of the group, as far as it is known.
     pub(super) group: Option<String>,
     pub(super) key: String,
-    pub(super) problem: Box<Problem>,
+    pub(super) problem: Box<SceneErrorKind>,
 }
 
 impl Wrong {
     /// The same, where it is a type, with all that is taken there.
     pub(super) fn expecting(mut self, all: &'static str) -> Wrong {
-        if let Problem::Type { expected, .. } = &mut *self.problem {
+        if let SceneErrorKind::Type { expected, .. } = &mut *self.problem {
             *expected = all;
         }
         self
@@ -67,7 +67,7 @@ impl<'a> Section<'a> {
                 span: key.span(),
                 group: section.group.clone(),
                 key: section.join(key.get_ref()),
-                problem: Box::new(Problem::UnknownKey {
+                problem: Box::new(SceneErrorKind::UnknownKey {
                     suggestion: closest(key.get_ref(), known.iter().copied()),
                     known: known.join(", "),
                 }),
@@ -94,11 +94,11 @@ impl<'a> Section<'a> {
 
     /// The value of a key that must be there, for example so.
     pub(super) fn need(&self, key: &str, example: &'static str) -> Result<Entry<'a>, Wrong> {
-        self.get(key).ok_or_else(|| self.wrong(key, Problem::Missing { example }))
+        self.get(key).ok_or_else(|| self.wrong(key, SceneErrorKind::Missing { example }))
     }
 
     /// A complaint about the table, under a key that it lacks.
-    pub(super) fn wrong(&self, key: &str, problem: Problem) -> Wrong {
+    pub(super) fn wrong(&self, key: &str, problem: SceneErrorKind) -> Wrong {
         let key = if key.is_empty() { self.path.clone() } else { self.join(key) };
         Wrong { span: self.span.clone(), group: self.group.clone(), key, problem: Box::new(problem) }
     }
@@ -111,7 +111,7 @@ impl<'a> Section<'a> {
 
 impl<'a> Entry<'a> {
     /// A complaint about the value.
-    pub(super) fn wrong(&self, problem: Problem) -> Wrong {
+    pub(super) fn wrong(&self, problem: SceneErrorKind) -> Wrong {
         Wrong {
             span: self.span.clone(),
             group: self.group.clone(),
@@ -121,7 +121,7 @@ impl<'a> Entry<'a> {
     }
 
     fn is_not(&self, expected: &'static str) -> Wrong {
-        self.wrong(Problem::Type { expected, found: describe(self.value) })
+        self.wrong(SceneErrorKind::Type { expected, found: describe(self.value) })
     }
 
     /// A number.
@@ -152,7 +152,7 @@ impl<'a> Entry<'a> {
         let text = self.text()?;
         let names = || known.iter().map(|(name, _)| *name);
         known.iter().find(|(name, _)| *name == text).map(|(_, value)| *value).ok_or_else(|| {
-            self.wrong(Problem::Choice {
+            self.wrong(SceneErrorKind::EngineChoice {
                 found: text.to_owned(),
                 suggestion: closest(text, names()),
                 known: names().collect::<Vec<_>>().join(", "),
@@ -174,8 +174,9 @@ impl<'a> Entry<'a> {
     /// So many numbers.
     pub(super) fn numbers<const N: usize>(&self, expected: &'static str) -> Result<[f64; N], Wrong> {
         let found = || describe(self.value);
-        let list = self.list().ok_or_else(|| self.wrong(Problem::Type { expected, found: found() }))??;
-        list.try_into().map_err(|_| self.wrong(Problem::Type { expected, found: found() }))
+        let list =
+            self.list().ok_or_else(|| self.wrong(SceneErrorKind::Type { expected, found: found() }))??;
+        list.try_into().map_err(|_| self.wrong(SceneErrorKind::Type { expected, found: found() }))
     }
 
     /// A table of no other keys than these, if it is a table.

@@ -11,10 +11,11 @@
 use super::tables::Tables;
 use super::text::{Text, float, list};
 use super::{COVER_AT, Form, LOOPED, LUMINANCE, NORMALS};
-use crate::dataset::Kind;
-use crate::level;
-use crate::program::{Affine, Level, Program, Source, Unit};
-use crate::real::Arithmetic;
+use crate::affine::Affine;
+use crate::dataset::SpectrumKind;
+use crate::program::{IntensityLaw, Program, Source, Unit};
+use crate::random::real::Arithmetic;
+use crate::random::stream;
 
 /// All of it.
 pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
@@ -31,7 +32,7 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
     text.block("fn is_accepted(z: Normals) -> bool", |body| {
         // What the excess of every band must be below: that of 1, or of infinity.
         let bound = match program.kind {
-            Kind::Reflectance if program.tests_base() => 1f32,
+            SpectrumKind::Reflectance if program.tests_base() => 1f32,
             _ => f32::INFINITY,
         };
         let limit = bound.to_bits() - 1;
@@ -45,7 +46,7 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
     });
     if program.scales() {
         text.block("fn scale(z: Normals, key: vec2<u32>, index: vec2<u32>, stream: u32) -> f32", |body| {
-            match &program.level {
+            match &program.intensity {
                 Some(level) => draw_level(body, level, tables),
                 None => body.line("return factor(z);"),
             }
@@ -54,17 +55,17 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
     text.0
 }
 
-fn draw_level(body: &mut Text, level: &Level, tables: &Tables) {
-    body.line(&format!("let word = philox(vec4(index, 0u, stream | {}u), key).x;", level::BLOCK));
+fn draw_level(body: &mut Text, level: &IntensityLaw, tables: &Tables) {
+    body.line(&format!("let word = philox(vec4(index, 0u, stream | {}u), key).x;", stream::DRAW_BLOCK));
     match level {
-        Level::LogUniform { low, octaves } => {
+        IntensityLaw::LogUniform { low, octaves } => {
             body.line(&format!(
                 "return {} * power_of_two(uniform_of(word) * {});",
                 float(*low),
                 float(*octaves)
             ));
         }
-        Level::OneOf(levels) => {
+        IntensityLaw::OneOf(levels) => {
             body.line(&format!("return tables[{}u + mul_wide(word, {}u).y];", tables.levels, levels.len()));
         }
     }

@@ -7,20 +7,23 @@
 //! bits.
 
 mod arithmetic;
+mod cover;
 mod module;
+#[cfg(test)]
+mod probe;
 mod store;
 mod tables;
 mod text;
 
-pub use module::TextError;
+pub use module::WgslError;
 pub(crate) use module::module;
 pub(crate) use tables::Tables;
 
 use arithmetic::arithmetic;
 use store::store;
 
-use crate::program::{Level, Program};
-use crate::quantity::{Element, Quantity};
+use crate::program::{IntensityLaw, Program};
+use crate::quantity::{Dtype, Quantity};
 
 /// Threads a workgroup.
 pub(crate) const WORKGROUP: u32 = 64;
@@ -45,11 +48,11 @@ const MUL_WIDE: &str = include_str!("../../shaders/mul_wide.wgsl");
 const MUL_WIDE_INT64: &str = include_str!("../../shaders/mul_wide_int64.wgsl");
 const PHILOX: &str = include_str!("../../shaders/philox.wgsl");
 const NORMAL: &str = include_str!("../../shaders/normal.wgsl");
-const LEVEL: &str = include_str!("../../shaders/level.wgsl");
+const LOG_UNIFORM: &str = include_str!("../../shaders/log_uniform.wgsl");
 const PHYSICAL: &str = include_str!("../../shaders/physical.wgsl");
-const LOOPED: &str = include_str!("../../shaders/looped.wgsl");
-const NORMALS: &str = include_str!("../../shaders/normals.wgsl");
-const LUMINANCE: &str = include_str!("../../shaders/luminance.wgsl");
+const LOOPED: &str = include_str!("../../shaders/arithmetic_looped.wgsl");
+const NORMALS: &str = include_str!("../../shaders/normals_looped.wgsl");
+const LUMINANCE: &str = include_str!("../../shaders/luminance_looped.wgsl");
 const DRAW: &str = include_str!("../../shaders/draw.wgsl");
 const PARAMETERS: &str = include_str!("../../shaders/parameters.wgsl");
 const WORDS: &str = include_str!("../../shaders/words.wgsl");
@@ -58,7 +61,7 @@ const MAIN: &str = include_str!("../../shaders/main.wgsl");
 
 /// What a device can do, as far as the text depends on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Target {
+pub(crate) enum Dialect {
     /// Any device.
     Baseline,
     /// A device with `SHADER_INT64`.
@@ -86,37 +89,37 @@ impl Form {
 }
 
 /// How many draws one thread makes: 2 where they fill words that are wider than a value.
-pub(crate) fn draws_per_thread(program: &Program, target: Target) -> u32 {
-    let halves = program.outputs.iter().any(|output| output.format.element == Element::F16);
+pub(crate) fn draws_per_thread(program: &Program, target: Dialect) -> u32 {
+    let halves = program.outputs.iter().any(|output| output.format.dtype == Dtype::F16);
     match (Form::of(program), target) {
-        (Form::Unrolled, Target::SoftwareInt64) => 2,
+        (Form::Unrolled, Dialect::SoftwareInt64) => 2,
         _ if halves => 2,
         _ => 1,
     }
 }
 
 /// The fragments that make random words and normals: the whole of what does not depend on a program.
-pub(crate) fn generator(target: Target) -> String {
+pub(crate) fn generator(target: Dialect) -> String {
     let mul_wide = match target {
-        Target::Baseline => MUL_WIDE,
-        Target::Int64 | Target::SoftwareInt64 => MUL_WIDE_INT64,
+        Dialect::Baseline => MUL_WIDE,
+        Dialect::Int64 | Dialect::SoftwareInt64 => MUL_WIDE_INT64,
     };
     [mul_wide, PHILOX, NORMAL].join("\n")
 }
 
 /// The compute shader of a program, and the numbers that it reads.
-pub(crate) fn shader(program: &Program, target: Target) -> (String, Tables) {
+pub(crate) fn shader(program: &Program, target: Dialect) -> (String, Tables) {
     let tables = Tables::new(program);
     let draws = draws_per_thread(program, target);
     let mut parts = vec![functions(program, &tables, target), PARAMETERS.to_owned()];
     if !tables.values.is_empty() {
         parts.push(format!("@group(0) @binding({TABLES_AT}) var<storage, read> tables: array<f32>;\n"));
     }
-    let elements = || program.outputs.iter().map(|output| output.format.element);
-    if elements().any(|element| element == Element::F16) {
+    let elements = || program.outputs.iter().map(|output| output.format.dtype);
+    if elements().any(|element| element == Dtype::F16) {
         parts.push(HALF.to_owned());
     }
-    if target == Target::SoftwareInt64 && draws == 2 && elements().any(|element| element != Element::F16) {
+    if target == Dialect::SoftwareInt64 && draws == 2 && elements().any(|element| element != Dtype::F16) {
         parts.push(WORDS.to_owned());
     }
     parts.push(store(program, &tables, target));
@@ -127,7 +130,7 @@ pub(crate) fn shader(program: &Program, target: Target) -> (String, Tables) {
 }
 
 /// The functions that make a draw, down to `draw_of`.
-fn functions(program: &Program, tables: &Tables, target: Target) -> String {
+fn functions(program: &Program, tables: &Tables, target: Dialect) -> String {
     let is = |word: &str| match word {
         "scaled" => program.scales(),
         "covered" => program.proposal.is_some(),
@@ -140,8 +143,8 @@ fn functions(program: &Program, tables: &Tables, target: Target) -> String {
     };
     let draw: String = DRAW.lines().filter_map(line).collect();
     let mut parts = vec![generator(target), PHYSICAL.to_owned()];
-    if let Some(Level::LogUniform { .. }) = program.level {
-        parts.push(LEVEL.to_owned());
+    if let Some(IntensityLaw::LogUniform { .. }) = program.intensity {
+        parts.push(LOG_UNIFORM.to_owned());
     }
     parts.extend([arithmetic(program, tables), draw]);
     parts.join("\n")
@@ -152,16 +155,22 @@ mod tests {
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     use super::*;
-    use crate::dataset::Kind;
-    use crate::program::{self, Affine, Bounds, Output, Source, Unit};
-    use crate::quantity::{Format, Layout};
+    use crate::affine::Affine;
+    use crate::dataset::SpectrumKind;
+    use crate::program::{self, Bounds, Output, Source, Unit};
+    use crate::quantity::{ArrayFormat, Layout};
 
     /// A program of 3 bands and 2 components, small enough to read.
-    fn small(kind: Kind, target: Option<(f64, Bounds)>) -> Program {
+    fn small(kind: SpectrumKind, target: Option<(f64, Bounds)>) -> Program {
         program_of(kind, 3, 2, target)
     }
 
-    fn program_of(kind: Kind, bands: usize, components: usize, target: Option<(f64, Bounds)>) -> Program {
+    fn program_of(
+        kind: SpectrumKind,
+        bands: usize,
+        components: usize,
+        target: Option<(f64, Bounds)>,
+    ) -> Program {
         let weights = vec![1.0 / bands as f64; bands];
         let spectrum = Affine {
             offset: (0..bands).map(|b| 0.5 + 0.125 * (b % 3) as f64).collect(),
@@ -169,46 +178,48 @@ mod tests {
                 .map(|j| (0..bands).map(|b| 0.25 / (1 + j + b % 7) as f64).collect())
                 .collect(),
         };
-        let outputs = vec![Output { format: Format::spectra(bands), source: Source::Spectrum }];
-        let target = target.map(|(lrv, bounds)| program::Target { lrv, weights, bounds });
-        Program { kind, spectrum, target, level: None, proposal: None, max_attempts: 100, outputs }.tallied()
+        let outputs = vec![Output { format: ArrayFormat::spectra(bands), source: Source::Spectrum }];
+        let target = target.map(|(lrv, bounds)| program::Dialect { lrv, weights, bounds });
+        Program { kind, spectrum, target, intensity: None, proposal: None, max_attempts: 100, outputs }
+            .with_status()
     }
 
     /// The program with all that can come out of it, so laid.
-    fn with_all(program: Program, layout: Layout, spectra: Element) -> Program {
+    fn with_all(program: Program, layout: Layout, spectra: Dtype) -> Program {
         let (n, k) = (program.bands(), program.components());
         let unit = || if program.scales() { Unit::Scale } else { Unit::One };
         let mut weights = Affine::constant(0.25, k);
         weights.gain[0][0] = 0.5;
         let xyz = program.spectrum.project(&[vec![0.5; n], vec![0.25; n], vec![0.125; n]]);
         let map = |quantity, map: Affine, unit| {
-            let format = Format { quantity, element: Element::F32, width: map.offset.len(), layout };
+            let format = ArrayFormat { quantity, element: Dtype::F32, width: map.offset.len(), layout };
             Output { format, source: Source::Map(map, unit) }
         };
         let over = match program.kind {
-            Kind::Illuminant => Unit::Over(xyz.value(1)),
-            Kind::Reflectance => unit(),
+            SpectrumKind::Illuminant => Unit::Over(xyz.value(1)),
+            SpectrumKind::Reflectance => unit(),
         };
         let mut outputs = vec![
             Output {
-                format: Format { element: spectra, layout, ..Format::spectra(n) },
+                format: ArrayFormat { element: spectra, layout, ..ArrayFormat::spectra(n) },
                 source: Source::Spectrum,
             },
             map(Quantity::Weights, weights, Unit::One),
             map(Quantity::Xyz, xyz.clone(), over),
-            map(Quantity::Srgb, xyz, unit()),
-            Output { format: Format::tally(), source: Source::Tally },
+            map(Quantity::LinearSrgb, xyz, unit()),
+            Output { format: ArrayFormat::status(), source: Source::Status },
         ];
-        if program.level.is_some() {
-            let format = Format { quantity: Quantity::Intensity, element: Element::F32, ..Format::tally() };
-            outputs.push(Output { format, source: Source::Level });
+        if program.intensity.is_some() {
+            let format =
+                ArrayFormat { quantity: Quantity::Intensity, element: Dtype::F32, ..ArrayFormat::status() };
+            outputs.push(Output { format, source: Source::Intensity });
         }
         Program { outputs, ..program }
     }
 
     /// The program with one quantity alone.
     fn only(program: Program, quantity: Quantity) -> Program {
-        let mut program = with_all(program, Layout::Rows, Element::F32);
+        let mut program = with_all(program, Layout::Rows, Dtype::F32);
         program.outputs.retain(|output| output.format.quantity == quantity);
         program
     }
@@ -227,16 +238,18 @@ mod tests {
             let of = |kind, rule: Option<Bounds>| {
                 program_of(kind, bands, components, rule.map(|bounds| (0.4, bounds)))
             };
-            programs.push(of(Kind::Illuminant, None));
-            for level in [Level::LogUniform { low: 0.5, octaves: 10.0 }, Level::OneOf(vec![1.0, 2.0])] {
-                programs.push(Program { level: Some(level), ..of(Kind::Illuminant, None) });
+            programs.push(of(SpectrumKind::Illuminant, None));
+            for level in
+                [IntensityLaw::LogUniform { low: 0.5, octaves: 10.0 }, IntensityLaw::OneOf(vec![1.0, 2.0])]
+            {
+                programs.push(Program { level: Some(level), ..of(SpectrumKind::Illuminant, None) });
             }
-            programs.extend(rules.map(|rule| of(Kind::Reflectance, rule)));
+            programs.extend(rules.map(|rule| of(SpectrumKind::Reflectance, rule)));
         }
         let layouts = [Layout::Rows, Layout::PaddedRows, Layout::Planes];
         let all = programs.clone().into_iter().flat_map(|program| {
             layouts.into_iter().flat_map(move |layout| {
-                [Element::F32, Element::F16].map(|spectra| with_all(program.clone(), layout, spectra))
+                [Dtype::F32, Dtype::F16].map(|spectra| with_all(program.clone(), layout, spectra))
             })
         });
         all.chain(programs).collect()
@@ -246,9 +259,9 @@ mod tests {
     fn every_variant_is_valid_with_no_more_than_it_says() {
         for program in programs() {
             for (target, needs) in [
-                (Target::Baseline, Capabilities::empty()),
-                (Target::Int64, Capabilities::SHADER_INT64),
-                (Target::SoftwareInt64, Capabilities::SHADER_INT64),
+                (Dialect::Baseline, Capabilities::empty()),
+                (Dialect::Int64, Capabilities::SHADER_INT64),
+                (Dialect::SoftwareInt64, Capabilities::SHADER_INT64),
             ] {
                 let (text, _) = shader(&program, target);
                 if let Err(e) = validate(&text, needs) {
@@ -262,7 +275,7 @@ mod tests {
     fn every_module_is_valid_and_two_fit_in_one_shader() {
         for program in programs() {
             let (Ok(a), Ok(b)) = (module(&program, "wall"), module(&program, "table_top")) else {
-                let table = matches!(program.level, Some(Level::OneOf(_)));
+                let table = matches!(program.intensity, Some(IntensityLaw::OneOf(_)));
                 assert!(table || Form::of(&program) == Form::Looped);
                 continue;
             };
@@ -270,71 +283,75 @@ mod tests {
             validate(&both, Capabilities::empty()).unwrap_or_else(|e| panic!("{e}"));
         }
         for prefix in ["", "1a", "a b", "a_", "a__b", "_a", "ä"] {
-            assert_eq!(module(&programs()[0], prefix), Err(TextError::Prefix(prefix.to_owned())));
+            assert_eq!(module(&programs()[0], prefix), Err(WgslError::Prefix(prefix.to_owned())));
         }
     }
 
     #[test]
     fn int64_is_not_taken_without_asking() {
-        let (text, _) = shader(&small(Kind::Illuminant, None), Target::Int64);
+        let (text, _) = shader(&small(SpectrumKind::Illuminant, None), Dialect::Int64);
         assert!(validate(&text, Capabilities::empty()).is_err());
     }
 
     /// The text between the fragments, for each kind of recipe: a change here is a decision.
     #[test]
     fn what_is_generated() {
-        let light = || small(Kind::Illuminant, None);
-        let surface = |target| small(Kind::Reflectance, target);
+        let light = || small(SpectrumKind::Illuminant, None);
+        let surface = |target| small(SpectrumKind::Reflectance, target);
         let lrv = |bounds| surface(Some((0.4, bounds)));
-        let level = Level::LogUniform { low: 0.15, octaves: 10.0 };
-        let lamp = || Program { level: Some(level.clone()), ..light() };
-        let lamps = || Program { level: Some(Level::OneOf(vec![1.0, 2.0])), ..light() };
+        let level = IntensityLaw::LogUniform { low: 0.15, octaves: 10.0 };
+        let lamp = || Program { level: Some(level.clone()), ..illuminant() };
+        let lamps = || Program { level: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..illuminant() };
         let generated = |program: &Program, target| {
             let tables = Tables::new(program);
             arithmetic(program, &tables) + &store(program, &tables, target)
         };
         for (name, program, target) in [
-            ("illuminant", light(), Target::Baseline),
-            ("illuminant_log_uniform", with_all(lamp(), Layout::Rows, Element::F32), Target::Baseline),
-            ("illuminant_of_the_data", only(lamps(), Quantity::Intensity), Target::Baseline),
-            ("reflectance", surface(None), Target::Baseline),
-            ("reflectance_in_pairs", surface(None), Target::SoftwareInt64),
+            ("illuminant", light(), Dialect::Baseline),
+            ("illuminant_log_uniform", with_all(lamp(), Layout::Rows, Dtype::F32), Dialect::Baseline),
+            ("illuminant_of_the_data", only(lamps(), Quantity::Intensity), Dialect::Baseline),
+            ("reflectance", surface(None), Dialect::Baseline),
+            ("reflectance_in_pairs", surface(None), Dialect::SoftwareInt64),
             (
                 "reflectance_in_planes",
-                with_all(surface(None), Layout::Planes, Element::F32),
-                Target::SoftwareInt64,
+                with_all(surface(None), Layout::Planes, Dtype::F32),
+                Dialect::SoftwareInt64,
             ),
             (
                 "reflectance_in_halves",
-                with_all(surface(None), Layout::PaddedRows, Element::F16),
-                Target::Int64,
+                with_all(surface(None), Layout::PaddedRows, Dtype::F16),
+                Dialect::Int64,
             ),
-            ("weights", only(surface(None), Quantity::Weights), Target::Baseline),
-            ("xyz", only(surface(None), Quantity::Xyz), Target::Baseline),
-            ("xyz_of_illuminant", only(light(), Quantity::Xyz), Target::Baseline),
-            ("attempts", only(surface(None), Quantity::Attempts), Target::Baseline),
-            ("lrv_base", lrv(Bounds::Base), Target::Baseline),
-            ("lrv_scaled", lrv(Bounds::Scaled), Target::Baseline),
-            ("lrv_both_in_pairs", lrv(Bounds::Both), Target::SoftwareInt64),
+            ("weights", only(surface(None), Quantity::Weights), Dialect::Baseline),
+            ("xyz", only(surface(None), Quantity::Xyz), Dialect::Baseline),
+            ("xyz_of_illuminant", only(light(), Quantity::Xyz), Dialect::Baseline),
+            ("attempts", only(surface(None), Quantity::Attempts), Dialect::Baseline),
+            ("lrv_base", lrv(Bounds::Base), Dialect::Baseline),
+            ("lrv_scaled", lrv(Bounds::Scaled), Dialect::Baseline),
+            ("lrv_both_in_pairs", lrv(Bounds::Both), Dialect::SoftwareInt64),
         ] {
             insta::assert_snapshot!(name, generated(&program, target));
         }
         let large = |layout, spectra| {
-            with_all(program_of(Kind::Reflectance, 400, 6, Some((0.4, Bounds::Both))), layout, spectra)
+            with_all(
+                program_of(SpectrumKind::Reflectance, 400, 6, Some((0.4, Bounds::Both))),
+                layout,
+                spectra,
+            )
         };
         for (name, layout, spectra) in [
-            ("looped", Layout::Rows, Element::F32),
-            ("looped_in_halves", Layout::PaddedRows, Element::F16),
-            ("looped_in_planes", Layout::Planes, Element::F16),
+            ("looped", Layout::Rows, Dtype::F32),
+            ("looped_in_halves", Layout::PaddedRows, Dtype::F16),
+            ("looped_in_planes", Layout::Planes, Dtype::F16),
         ] {
-            insta::assert_snapshot!(name, generated(&large(layout, spectra), Target::Int64));
+            insta::assert_snapshot!(name, generated(&large(layout, spectra), Dialect::Int64));
         }
     }
 
     #[test]
     fn what_is_not_asked_for_is_not_in_the_text() {
-        let text = |program: &Program| shader(program, Target::Baseline).0;
-        let plain = text(&small(Kind::Reflectance, None));
+        let text = |program: &Program| shader(program, Dialect::Baseline).0;
+        let plain = text(&small(SpectrumKind::Reflectance, None));
         for word in
             ["luminance", "factor", "scale", "fn half", "u64", "power_of_two", "weights", "xyz", "tables"]
         {
@@ -343,9 +360,9 @@ mod tests {
         let one = format!("{}u", 1f32.to_bits() - 1);
         let infinity = format!("{}u", f32::INFINITY.to_bits() - 1);
         assert!(plain.contains(&one) && !plain.contains(&infinity));
-        let light = text(&small(Kind::Illuminant, None));
+        let light = text(&small(SpectrumKind::Illuminant, None));
         assert!(light.contains(&infinity) && !light.contains(&one));
-        let xyz = text(&only(small(Kind::Reflectance, None), Quantity::Xyz));
+        let xyz = text(&only(small(SpectrumKind::Reflectance, None), Quantity::Xyz));
         assert!(xyz.contains("xyz[") && !xyz.contains("spectra") && !xyz.contains("attempts["));
     }
 }

@@ -3,16 +3,16 @@
 
 use super::tables::Tables;
 use super::text::{Text, list};
-use super::{Form, Target, UNROLLED_GAINS, functions};
-use crate::program::{Level, Program, Source, Unit};
+use super::{Dialect, Form, UNROLLED_GAINS, functions};
+use crate::program::{IntensityLaw, Program, Source, Unit};
 use crate::quantity::Quantity;
-use crate::real::Arithmetic;
+use crate::random::real::Arithmetic;
 
 /// Why a recipe has no text.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
-pub enum TextError {
+pub enum WgslError {
     #[error("{0:?} cannot start a name in WGSL: use letters, digits and single _, a letter first")]
     Prefix(String),
     #[error(
@@ -25,22 +25,22 @@ pub enum TextError {
 }
 
 /// The module of a program.
-pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, TextError> {
+pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, WgslError> {
     let starts_well = prefix.starts_with(|c: char| c.is_ascii_alphabetic());
     let holds = |c: char| c.is_ascii_alphanumeric() || c == '_';
     if !starts_well || !prefix.chars().all(holds) || prefix.contains("__") || prefix.ends_with('_') {
-        return Err(TextError::Prefix(prefix.to_owned()));
+        return Err(WgslError::Prefix(prefix.to_owned()));
     }
     if Form::of(program) == Form::Looped {
-        return Err(TextError::TooLarge { bands: program.bands(), components: program.components() });
+        return Err(WgslError::TooLarge { bands: program.bands(), components: program.components() });
     }
-    if let Some(Level::OneOf(_)) = program.level {
-        return Err(TextError::Table("intensities of the data"));
+    if let Some(IntensityLaw::OneOf(_)) = program.intensity {
+        return Err(WgslError::Table("intensities of the data"));
     }
     if program.proposal.is_some() {
-        return Err(TextError::Table("the boxes that candidates are proposed from"));
+        return Err(WgslError::Table("the boxes that candidates are proposed from"));
     }
-    let draw = functions(program, &Tables::default(), Target::Baseline);
+    let draw = functions(program, &Tables::default(), Dialect::Baseline);
     // What naga_oil imports may name structures, but no other types.
     let normals = format!("array<f32, {}>", program.components());
     let draw = draw.replace(&format!("alias Normals = {normals};\n"), "").replace("Normals", &normals);
@@ -64,7 +64,7 @@ fn interface(program: &Program) -> String {
             Source::Spectrum => spectrum(&mut text, program),
             Source::Map(_, unit) => {
                 let (result, head) = match quantity {
-                    Quantity::Xyz | Quantity::Srgb => ("vec3<f32>".to_owned(), "vec3".to_owned()),
+                    Quantity::Xyz | Quantity::LinearSrgb => ("vec3<f32>".to_owned(), "vec3".to_owned()),
                     Quantity::Lrv => ("f32".to_owned(), String::new()),
                     _ => (format!("array<f32, {width}>"), "array".to_owned()),
                 };
@@ -81,10 +81,10 @@ fn interface(program: &Program) -> String {
                     });
                 });
             }
-            Source::Level => text.block(&format!("fn {quantity}(d: Draw) -> f32"), |body| {
+            Source::Intensity => text.block(&format!("fn {quantity}(d: Draw) -> f32"), |body| {
                 body.line("return d.scale;");
             }),
-            Source::Tally => {} // it is in the Draw
+            Source::Status => {} // it is in the Draw
         }
     }
     text.0

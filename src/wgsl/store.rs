@@ -2,10 +2,11 @@
 
 use super::tables::Tables;
 use super::text::Text;
-use super::{Form, OUTPUTS_AT, Target, draws_per_thread};
-use crate::program::{Output, Program, Source, Tally, Unit};
-use crate::quantity::{Element, Format, Interval, Layout};
-use crate::real::Arithmetic;
+use super::{Dialect, Form, OUTPUTS_AT, draws_per_thread};
+use crate::draw_status::DrawStatus;
+use crate::program::{Output, Program, Source, Unit};
+use crate::quantity::{ArrayFormat, Dtype, Layout, ValueRange};
+use crate::random::real::Arithmetic;
 
 /// How the values of an output make words of its buffer.
 #[derive(Clone, Copy, PartialEq)]
@@ -19,10 +20,10 @@ enum Word {
 }
 
 impl Word {
-    fn of(format: &Format, form: Form, target: Target) -> Word {
-        match (format.element, form, target) {
-            (Element::F16, ..) => Word::Halves,
-            (_, Form::Unrolled, Target::SoftwareInt64) => Word::Pair,
+    fn of(format: &ArrayFormat, form: Form, target: Dialect) -> Word {
+        match (format.dtype, form, target) {
+            (Dtype::F16, ..) => Word::Halves,
+            (_, Form::Unrolled, Dialect::SoftwareInt64) => Word::Pair,
             _ => Word::Value,
         }
     }
@@ -31,19 +32,19 @@ impl Word {
         if self == Word::Value { 1 } else { 2 }
     }
 
-    fn name(self, element: Element) -> &'static str {
-        match (self, element) {
-            (Word::Value, Element::F32) => "f32",
+    fn name(self, dtype: Dtype) -> &'static str {
+        match (self, dtype) {
+            (Word::Value, Dtype::F32) => "f32",
             (Word::Value, _) | (Word::Halves, _) => "u32",
             (Word::Pair, _) => "u64",
         }
     }
 
     /// The word of its values.
-    fn pack(self, element: Element, values: &[String]) -> String {
-        match (self, element, values) {
+    fn pack(self, dtype: Dtype, values: &[String]) -> String {
+        match (self, dtype, values) {
             (Word::Value, _, [value]) => value.clone(),
-            (Word::Pair, Element::F32, [low, high]) => format!("float_word({low}, {high})"),
+            (Word::Pair, Dtype::F32, [low, high]) => format!("float_word({low}, {high})"),
             (Word::Pair, _, [low, high]) => format!("word({low}, {high})"),
             (Word::Halves, _, [low, high]) => format!("half({low}) | (half({high}) << 16u)"),
             _ => unreachable!("a word has as many values as it says"),
@@ -63,23 +64,23 @@ enum At<'a> {
 struct Store<'a> {
     program: &'a Program,
     tables: &'a Tables,
-    target: Target,
+    target: Dialect,
     form: Form,
     /// The names of the thread's draws.
     draws: &'static [&'static str],
 }
 
-pub(super) fn store(program: &Program, tables: &Tables, target: Target) -> String {
+pub(super) fn store(program: &Program, tables: &Tables, target: Dialect) -> String {
     let draws: &[_] = if draws_per_thread(program, target) == 2 { &["a", "b"] } else { &["a"] };
     let store = Store { program, tables, target, form: Form::of(program), draws };
     let mut text = Text::default();
     for output in &program.outputs {
-        let Format { quantity, element, .. } = output.format;
+        let ArrayFormat { quantity, dtype, .. } = output.format;
         let word = Word::of(&output.format, store.form, target);
         text.line(&format!(
             "@group(0) @binding({}) var<storage, read_write> {quantity}: array<{}>;",
             OUTPUTS_AT + quantity as u32,
-            word.name(element)
+            word.name(dtype)
         ));
     }
     let arguments: String = draws.iter().map(|d| format!(", {d}: Draw")).collect();
@@ -135,15 +136,15 @@ impl Store<'_> {
                     Unit::Over(_) => format!("{map} * {quantity}_unit_{d}"),
                 }
             }
-            Source::Level => format!("{d}.scale"),
-            Source::Tally if self.program.may_exceed_one() => {
+            Source::Intensity => format!("{d}.scale"),
+            Source::Status if self.program.may_exceed_one() => {
                 let above_one = format!("ok_{d} && peak(worst({d}.z)) * {d}.scale >= 1f");
-                return format!("{d}.attempts | select(0u, {}u, {above_one})", Tally::ABOVE_ONE);
+                return format!("{d}.attempts | select(0u, {}u, {above_one})", DrawStatus::ABOVE_ONE);
             }
-            Source::Tally => return format!("{d}.attempts"),
+            Source::Status => return format!("{d}.attempts"),
         };
-        let value = match (&output.source, output.format.element) {
-            (Source::Spectrum, Element::F16) => within(value, self.program.interval()),
+        let value = match (&output.source, output.format.dtype) {
+            (Source::Spectrum, Dtype::F16) => within(value, self.program.interval()),
             _ => value,
         };
         format!("select(0f, {value}, ok_{d})")
@@ -151,7 +152,7 @@ impl Store<'_> {
 
     fn in_lines(&self, body: &mut Text, i: usize, output: &Output) {
         let format = &output.format;
-        let Format { quantity, element, width, .. } = *format;
+        let ArrayFormat { quantity, dtype, width, .. } = *format;
         let word = Word::of(format, self.form, self.target);
         // Both draws band by band, so that they share the constants.
         for (j, d) in (0..width).flat_map(|j| self.draws.iter().map(move |d| (j, d))) {
@@ -179,14 +180,14 @@ impl Store<'_> {
         };
         for (start, values) in runs {
             for (at, values) in values.chunks_exact(word.values()).enumerate() {
-                body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(element, values)));
+                body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(dtype, values)));
             }
         }
     }
 
     fn in_a_loop(&self, body: &mut Text, i: usize, output: &Output) {
         let format = &output.format;
-        let Format { quantity, element, width, .. } = *format;
+        let ArrayFormat { quantity, dtype, width, .. } = *format;
         let word = Word::of(format, self.form, self.target);
         let value = |d: &str, j: &str| self.value(i, output, d, At::Variable(j));
         match (format.layout, word) {
@@ -196,7 +197,7 @@ impl Store<'_> {
                     let values: Vec<_> = self.draws.iter().map(|d| value(d, "j")).collect();
                     let start = format!("{} + thread * {words}u", plane(word, At::Variable("j")));
                     for (at, values) in values.chunks_exact(word.values()).enumerate() {
-                        body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(element, values)));
+                        body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(dtype, values)));
                     }
                 });
             }
@@ -218,7 +219,7 @@ impl Store<'_> {
                     let halves = ["values.x".to_owned(), "values.y".to_owned()];
                     body.line(&format!(
                         "{quantity}[thread * {stride}u + at] = {};",
-                        word.pack(element, &halves)
+                        word.pack(dtype, &halves)
                     ));
                 });
             }
@@ -239,7 +240,7 @@ impl Store<'_> {
 }
 
 /// A value that is about to be rounded to 16 bits, kept where that leaves it in the interval.
-fn within(value: String, interval: Interval) -> String {
+fn within(value: String, interval: ValueRange) -> String {
     let [least, largest] = interval.halves();
     match largest.is_finite() {
         true => format!("clamp({value}, {least:?}f, {largest:?}f)"),

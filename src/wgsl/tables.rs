@@ -2,7 +2,8 @@
 //! loops, and the levels that an intensity is one of.
 
 use super::Form;
-use crate::program::{Affine, Level, Program, Source, Unit};
+use crate::affine::Affine;
+use crate::program::{IntensityLaw, Program, Source, Unit};
 
 #[derive(Default)]
 pub(crate) struct Tables {
@@ -39,7 +40,7 @@ impl Tables {
             tables.values.extend(program.target.iter().flat_map(|t| &t.weights).map(|&w| w as f32));
         }
         tables.levels = tables.values.len();
-        if let Some(Level::OneOf(levels)) = &program.level {
+        if let Some(IntensityLaw::OneOf(levels)) = &program.intensity {
             tables.values.extend(levels.iter().map(|&level| level as f32));
         }
         tables

@@ -2,8 +2,8 @@
 //! Without a fault its draws are the library's in f64.
 
 use nalgebra::{DMatrix, DVector};
-use spectroll::statistics::{Draw, Scenario};
-use spectroll::{Bounds, Kind, Real, Stream, colorimetry, philox};
+use spectroll::evaluation::statistics::{Scenario, ScenarioDraw};
+use spectroll::{Bounds, Real, SpectrumKind, Stream, colorimetry, philox};
 
 /// What is wrong with a sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,7 +94,7 @@ impl<'a> Pipeline<'a> {
         self.fault == Some(fault)
     }
 
-    pub(crate) fn draw(&self, stream: Stream, index: u64) -> Draw {
+    pub(crate) fn draw(&self, stream: Stream, index: u64) -> ScenarioDraw {
         (0..)
             .find_map(|attempt| Some((self.candidate(stream, index, attempt)?, attempt + 1)))
             .expect("a draw ends")
@@ -144,7 +144,7 @@ impl<'a> Pipeline<'a> {
             Some(Fault::BoundsTight) => -1e-3,
             _ => 0.0,
         };
-        let limit = if self.scenario.model.kind() == Kind::Illuminant { f64::INFINITY } else { 1.0 };
+        let limit = if self.scenario.model.kind() == SpectrumKind::Illuminant { f64::INFINITY } else { 1.0 };
         let physical = |s: &DVector<f64>| s.iter().all(|&s| s > -margin && s < limit + margin);
         let Some((target, bounds)) = self.scenario.target else {
             return physical(&base).then(|| base.as_slice().to_vec());

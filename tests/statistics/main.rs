@@ -1,7 +1,7 @@
 //! Statistics: whether the draws have the distribution that they should, by checks that are shown to fail.
 //!
 //! Samples of the f32 engine, which the twins tie to every other engine, are held against an oracle that shares no code
-//! with it, by the checks of `spectroll::statistics`. The same checks are then run on samplers that are broken in one
+//! with it, by the checks of `spectroll::evaluation::statistics`. The same checks are then run on samplers that are broken in one
 //! way each (`broken.rs`): every fault must be caught, and by the check that is there for it. Seeds are fixed, so a
 //! failure is never chance. Many seeds are a matter of minutes, and only run when asked for (`make exhaustive`).
 
@@ -10,10 +10,10 @@ mod broken;
 use std::f64::consts::TAU;
 
 use broken::{Fault, Pipeline};
-use spectroll::statistics::{
-    self, Check, EDGE, KNOWN, Sample, Sampler, Scenario, battery, sigmas, smallest_errors,
+use spectroll::evaluation::statistics::{
+    self, Check, EDGE, KNOWN, Sample, SampleFn, Scenario, battery, sigmas, smallest_errors,
 };
-use spectroll::{Bounds, Choice, Engine, EngineError, Model, Proposal, Recipe, Stream};
+use spectroll::{Bounds, Engine, EngineChoice, EngineError, Model, ProposalKind, Recipe, Stream};
 
 /// Draws of a sample of the engine, and of its reference.
 const DRAWS: u64 = 1 << 18;
@@ -35,14 +35,14 @@ const SOUND_RUNS: usize = ENGINE_RUNS + LIBRARY_RUNS + PIPELINE_RUNS + ORACLE_RU
 const _: () = assert!(SOUND_RUNS <= statistics::RUNS);
 
 /// How many checks were run on a sampler, and what those that failed said.
-fn run_checks(sampler: Sampler, oracle: &Sample, seed: u64) -> (usize, Vec<(&'static str, String)>) {
+fn run_checks(sampler: SampleFn, oracle: &Sample, seed: u64) -> (usize, Vec<(&'static str, String)>) {
     let findings = battery(sampler, oracle, seed);
     let failed = findings.iter().filter_map(|(check, finding)| Some((check.name, finding.alarm()?)));
     (findings.len(), failed.collect())
 }
 
 fn cpu() -> Engine {
-    Engine::new(&Choice::Cpu).expect("the CPU is always there")
+    Engine::new(&EngineChoice::Cpu).expect("the CPU is always there")
 }
 
 /// Runs every check on the engine in every scenario, and says how many there were and what failed.
@@ -169,9 +169,9 @@ fn every_bit_of_a_uniform_is_used() {
 #[test]
 fn acceptance_is_what_numpy_measured() {
     let reflectances = Model::builtin("munsell-vrhel").expect("it is built in");
-    let scaled = |lrv| Recipe::new(&reflectances).lrv(lrv).bounds(Bounds::Scaled);
-    let spread = |scale| Recipe::new(&reflectances).covariance_scale(scale);
-    let illuminants = Recipe::new(&Model::builtin("granada").expect("it is built in"));
+    let scaled = |lrv| Recipe::builder(&reflectances).lrv(lrv).bounds(Bounds::Scaled);
+    let spread = |scale| Recipe::builder(&reflectances).covariance_scale(scale);
+    let illuminants = Recipe::builder(&Model::builtin("granada").expect("it is built in"));
     let table = [
         ("illuminants", illuminants, 1.0, 1e-4),
         ("covariance x 1", spread(1.0), 0.756, 5e-4),
@@ -188,7 +188,7 @@ fn acceptance_is_what_numpy_measured() {
     assert_eq!(table.len(), TABLE_RUNS);
     let engine = cpu();
     for (name, recipe, expected, rounding) in table {
-        let recipe = recipe.proposal(Proposal::Plain).build().expect("the recipe can be drawn");
+        let recipe = recipe.proposal(ProposalKind::Plain).build().expect("the recipe can be drawn");
         let draws = (1e6 * expected) as u64;
         let summary =
             engine.draw(&recipe, Stream::named(SEED, name).draws(0..draws), |_| Ok::<_, EngineError>(()));
@@ -220,7 +220,7 @@ fn known_answers() {
     ];
     for (stream, index, attempts, values) in answers {
         let (exact, rounded) = (recipe.draw::<f64>(stream, index), recipe.draw::<f32>(stream, index));
-        assert_eq!((exact.tally().attempts(), rounded.tally().attempts()), (attempts, attempts));
+        assert_eq!((exact.status().attempts(), rounded.status().attempts()), (attempts, attempts));
         let (exact, rounded) = (exact.spectrum(), rounded.spectrum());
         for (band, value) in [0, 15, 30].into_iter().zip(values) {
             assert!((exact[band] - value).abs() < 1e-12, "{stream:?} {index}: {} {value}", exact[band]);
@@ -301,7 +301,7 @@ fn the_pipeline_without_a_fault_is_the_library() {
         for index in 0..KNOWN {
             let ((ours, attempts), theirs) =
                 (pipeline.draw(stream, index), recipe.draw::<f64>(stream, index));
-            assert_eq!(attempts, theirs.tally().attempts(), "{}: draw {index}", scenario.name);
+            assert_eq!(attempts, theirs.status().attempts(), "{}: draw {index}", scenario.name);
             assert!(
                 ours.iter().zip(theirs.spectrum()).all(|(a, b)| (a - b).abs() < 1e-11),
                 "{}: draw {index}",

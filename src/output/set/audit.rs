@@ -3,26 +3,26 @@
 use std::path::{Path, PathBuf};
 
 use super::super::OutputError;
-use super::super::schema::Constant;
+use super::super::schema::SharedArray;
 use super::Part;
-use super::manifest::{Manifest, Plan, Sum};
+use super::manifest::{Manifest, SetPlan, Sum};
 
 /// A set that is being checked, complete or not.
-pub struct Audit {
+pub struct SetAudit {
     root: PathBuf,
     manifest: Manifest,
 }
 
-impl Audit {
+impl SetAudit {
     /// Reads the manifest of the set in a folder.
-    pub fn open(path: &Path) -> Result<Audit, OutputError> {
+    pub fn open(path: &Path) -> Result<SetAudit, OutputError> {
         let found = if path.is_dir() { Manifest::joined(path)? } else { None };
         let manifest = found.ok_or_else(|| OutputError::NotASet { path: path.to_owned() })?;
-        Ok(Audit { root: path.to_owned(), manifest })
+        Ok(SetAudit { root: path.to_owned(), manifest })
     }
 
     /// What the set is.
-    pub fn plan(&self) -> &Plan {
+    pub fn plan(&self) -> &SetPlan {
         &self.manifest.plan
     }
 
@@ -43,7 +43,7 @@ impl Audit {
 
     /// How what all draws share, drawn again as `constants`, differs from what was written, if it does: no manifest
     /// has its sums.
-    pub fn shared_difference(&self, constants: Vec<Constant>) -> Result<Option<String>, OutputError> {
+    pub fn shared_difference(&self, constants: Vec<SharedArray>) -> Result<Option<String>, OutputError> {
         let mut plan = self.manifest.plan.clone();
         plan.schema.constants = constants;
         let failed = |source| OutputError::Write { path: self.root.clone(), source };

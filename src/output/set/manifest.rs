@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::super::pending::ignore_missing;
 use super::super::{OutputError, Schema};
-use super::{Layout, Part};
+use super::{ChunkFormat, Part};
 
 /// The manifest of a whole set.
 pub(super) const SEALED: &str = "manifest.json";
@@ -24,9 +24,9 @@ const VERSION: u32 = 1;
 
 /// What a set is: all that its bytes depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Plan {
+pub struct SetPlan {
     /// How its chunks are stored.
-    pub layout: Layout,
+    pub layout: ChunkFormat,
     /// How many draws a chunk has; the last may have fewer.
     pub chunk: u64,
     /// What it holds.
@@ -34,7 +34,7 @@ pub struct Plan {
     pub schema: Schema,
 }
 
-impl Plan {
+impl SetPlan {
     /// How many chunks there are.
     pub fn chunks(&self) -> u64 {
         self.schema.count.div_ceil(self.chunk)
@@ -47,7 +47,7 @@ impl Plan {
     }
 
     /// Where another plan differs, with the value here and the value there.
-    fn difference(&self, other: &Plan) -> Option<String> {
+    fn difference(&self, other: &SetPlan) -> Option<String> {
         let json = |plan| serde_json::to_value(plan).expect("plans are JSON");
         difference("", &json(self), &json(other))
     }
@@ -104,7 +104,7 @@ impl Sum {
 pub(super) struct Manifest {
     /// Its version.
     manifest: u32,
-    pub(super) plan: Plan,
+    pub(super) plan: SetPlan,
     /// What drew.
     pub(super) engines: BTreeSet<String>,
     /// The files of each chunk that is done.
@@ -112,7 +112,7 @@ pub(super) struct Manifest {
 }
 
 impl Manifest {
-    pub(super) fn new(plan: Plan) -> Manifest {
+    pub(super) fn new(plan: SetPlan) -> Manifest {
         Manifest { manifest: VERSION, plan, engines: BTreeSet::new(), chunks: BTreeMap::new() }
     }
 
@@ -121,7 +121,7 @@ impl Manifest {
     }
 
     /// An error where a plan is not that of this manifest, which lies in the folder `root`.
-    pub(super) fn check(&self, plan: &Plan, root: &Path) -> Result<(), OutputError> {
+    pub(super) fn check(&self, plan: &SetPlan, root: &Path) -> Result<(), OutputError> {
         match plan.difference(&self.plan) {
             Some(difference) => Err(OutputError::Different { path: root.to_owned(), difference }),
             None => Ok(()),

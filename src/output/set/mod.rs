@@ -7,8 +7,10 @@
 
 mod audit;
 mod manifest;
+mod parts;
 mod pool;
 mod seal;
+mod zarr;
 
 use std::borrow::Cow;
 use std::fs;
@@ -21,13 +23,13 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::OutputError;
 use super::pending::{existing_folder, place};
-use super::{OutputError, parts, zarr};
-pub use audit::Audit;
-pub use manifest::Plan;
+pub use audit::SetAudit;
+pub use manifest::SetPlan;
 use manifest::{Manifest, part_name};
 use pool::{Chunk, Pool};
-pub use seal::{Outcome, merge};
+pub use seal::{SetStatus, merge};
 
 /// About how many bytes a chunk has unless asked otherwise: large enough for a disk, small enough to hold several.
 const CHUNK_BYTES: u64 = 16 << 20;
@@ -39,7 +41,7 @@ const CHECKPOINT: Duration = Duration::from_millis(100);
 /// How chunks are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Layout {
+pub enum ChunkFormat {
     /// A Zarr store, version 3, packed by Zstandard at a level if that is given.
     Zarr {
         /// The level of Zstandard.
@@ -58,48 +60,48 @@ pub(super) struct Part<'a> {
     pub(super) bytes: Cow<'a, [u8]>,
 }
 
-impl Layout {
+impl ChunkFormat {
     /// How many of `count` draws of such rows a chunk has, unless asked otherwise: a power of two, or all.
     pub fn default_chunk(row_bytes: u64, count: u64) -> u64 {
         (1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2()).min(count.max(1))
     }
 
     /// The files of a chunk.
-    fn encode<'a>(self, plan: &Plan, index: u64, columns: &'a [Vec<u8>]) -> io::Result<Vec<Part<'a>>> {
+    fn encode<'a>(self, plan: &SetPlan, index: u64, columns: &'a [Vec<u8>]) -> io::Result<Vec<Part<'a>>> {
         match self {
-            Layout::Zarr { zstd } => zarr::chunk(&plan.schema, zstd, plan.chunk, index, columns),
-            Layout::Npy => parts::npy(&plan.schema, index, columns),
-            Layout::Parquet => parts::parquet(&plan.schema, index, columns),
+            ChunkFormat::Zarr { zstd } => zarr::chunk(&plan.schema, zstd, plan.chunk, index, columns),
+            ChunkFormat::Npy => parts::npy(&plan.schema, index, columns),
+            ChunkFormat::Parquet => parts::parquet(&plan.schema, index, columns),
         }
     }
 
     /// The files that tell what the chunks are.
-    fn metadata(self, plan: &Plan) -> io::Result<Vec<Part<'static>>> {
+    fn metadata(self, plan: &SetPlan) -> io::Result<Vec<Part<'static>>> {
         match self {
-            Layout::Zarr { zstd } => Ok(zarr::metadata(&plan.schema, zstd, plan.chunk)),
-            Layout::Npy => parts::npy_metadata(&plan.schema),
-            Layout::Parquet => Ok(Vec::new()),
+            ChunkFormat::Zarr { zstd } => Ok(zarr::metadata(&plan.schema, zstd, plan.chunk)),
+            ChunkFormat::Npy => parts::npy_metadata(&plan.schema),
+            ChunkFormat::Parquet => Ok(Vec::new()),
         }
     }
 
     /// The files of what all draws share.
-    fn constants(self, plan: &Plan) -> io::Result<Vec<Part<'_>>> {
+    fn constants(self, plan: &SetPlan) -> io::Result<Vec<Part<'_>>> {
         match self {
-            Layout::Zarr { .. } => Ok(zarr::constants(&plan.schema)),
-            Layout::Npy => parts::npy_constants(&plan.schema),
-            Layout::Parquet => Ok(Vec::new()), // see Layout::check
+            ChunkFormat::Zarr { .. } => Ok(zarr::constants(&plan.schema)),
+            ChunkFormat::Npy => parts::npy_constants(&plan.schema),
+            ChunkFormat::Parquet => Ok(Vec::new()), // see Layout::check
         }
     }
 
     /// The folders in a set.
-    fn folders(self, plan: &Plan) -> Vec<String> {
+    fn folders(self, plan: &SetPlan) -> Vec<String> {
         match self {
-            Layout::Zarr { .. } => {
+            ChunkFormat::Zarr { .. } => {
                 let names = plan.schema.fields.iter().map(|field| field.name.clone());
                 let constants = plan.schema.constants.iter().map(|constant| constant.name.clone());
                 names.chain(constants).chain(["wavelength".to_owned()]).collect()
             }
-            Layout::Npy | Layout::Parquet => Vec::new(),
+            ChunkFormat::Npy | ChunkFormat::Parquet => Vec::new(),
         }
     }
 }
@@ -126,11 +128,11 @@ impl Shard {
 
 /// What to do with what is there already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
+pub enum SetMode {
     /// Refuse to touch it.
-    New,
+    Create,
     /// Begin again, and replace it once the new set is complete.
-    Again,
+    Replace,
     /// Check it, and do what is missing.
     Resume,
 }
@@ -140,9 +142,9 @@ pub struct SetWriter {
     path: PathBuf,
     /// Where its chunks are until it is sealed.
     root: PathBuf,
-    plan: Arc<Plan>,
+    plan: Arc<SetPlan>,
     shard: Shard,
-    start: Start,
+    start: SetMode,
     /// What this process has done or found done.
     manifest: Manifest,
     /// The chunks to be drawn, in order.
@@ -162,9 +164,9 @@ impl SetWriter {
     /// `engine` is what will draw.
     pub fn open(
         path: &Path,
-        plan: Plan,
+        plan: SetPlan,
         companions: &[(&str, &str)],
-        (shard, start): (Shard, Start),
+        (shard, start): (Shard, SetMode),
         engine: &str,
     ) -> Result<SetWriter, OutputError> {
         let path = PathBuf::from_iter(path.components()); // without a slash at its end
@@ -292,15 +294,15 @@ impl SetWriter {
     }
 
     /// Waits for the last chunks, and seals the set where all of it is there.
-    pub fn finish(mut self) -> Result<Outcome, OutputError> {
+    pub fn finish(mut self) -> Result<SetStatus, OutputError> {
         assert!(self.missing.is_empty(), "all that was missing was written");
         if self.root == self.path {
-            return Ok(Outcome::Sealed); // it was before
+            return Ok(SetStatus::Sealed); // it was before
         }
         self.pool.close();
         self.collect()?;
         self.save()?;
-        seal::seal(&self.path, self.start == Start::Again)
+        seal::seal(&self.path, self.start == SetMode::Replace)
     }
 
     /// Keeps what is finished, and leaves the rest to another run. Says how many chunks of how many that is.
@@ -339,9 +341,9 @@ mod tests {
 
     #[test]
     fn a_chunk_is_a_power_of_two_of_draws_or_all() {
-        assert_eq!(Layout::default_chunk(124, 1 << 40), 1 << 17);
-        assert_eq!(Layout::default_chunk(1 << 40, 10), 1);
-        assert_eq!(Layout::default_chunk(124, 10), 10);
-        assert_eq!(Layout::default_chunk(124, 0), 1);
+        assert_eq!(ChunkFormat::default_chunk(124, 1 << 40), 1 << 17);
+        assert_eq!(ChunkFormat::default_chunk(1 << 40, 10), 1);
+        assert_eq!(ChunkFormat::default_chunk(124, 10), 10);
+        assert_eq!(ChunkFormat::default_chunk(124, 0), 1);
     }
 }

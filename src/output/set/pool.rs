@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use super::super::pending::place;
-use super::Plan;
+use super::SetPlan;
 use super::manifest::Sum;
 
 /// How many there are: one can hash while the other waits for the disk.
@@ -36,7 +36,7 @@ pub(super) struct Pool {
 
 impl Pool {
     /// Threads that write the chunks of a set in the folder `root`.
-    pub(super) fn new(plan: &Arc<Plan>, root: &Path) -> Pool {
+    pub(super) fn new(plan: &Arc<SetPlan>, root: &Path) -> Pool {
         // One waits: with one being filled and one a thread, that bounds the memory to four.
         let (queue, chunks) = sync_channel(1);
         let (finished, done) = channel();
@@ -81,7 +81,7 @@ impl Drop for Pool {
 }
 
 struct Worker {
-    plan: Arc<Plan>,
+    plan: Arc<SetPlan>,
     root: PathBuf,
     chunks: Arc<Mutex<Receiver<Chunk>>>,
     finished: Sender<Done>,

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use super::super::pending::{PREFIX, SUFFIX, folder, place_by, sweep, sync_folder};
 use super::super::{OutputError, partial};
 use super::manifest::{Manifest, SEALED, manifests, part_name, remove_parts};
-use super::{Plan, Shard, Start};
+use super::{SetMode, SetPlan, Shard};
 
 /// What a run left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
+pub enum SetStatus {
     /// The set is complete, under its name.
     Sealed,
     /// Other processes have chunks to finish.
@@ -25,16 +25,21 @@ pub enum Outcome {
 
 /// Sees to it that the set's folder is there, and that it may be written to. Returns where its chunks are: in `path`
 /// itself where a complete set is resumed.
-pub(super) fn occupy(path: &Path, plan: &Plan, shard: Shard, start: Start) -> Result<PathBuf, OutputError> {
+pub(super) fn occupy(
+    path: &Path,
+    plan: &SetPlan,
+    shard: Shard,
+    start: SetMode,
+) -> Result<PathBuf, OutputError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
     if path.symlink_metadata().is_ok() {
         if !path.is_dir() {
             return Err(OutputError::NotAFolder { path: path.to_owned() });
         }
         match start {
-            Start::New => return Err(OutputError::Exists { path: path.to_owned() }),
-            Start::Again => drop(Manifest::sealed(path)?), // nothing but a set is replaced
-            Start::Resume => {
+            SetMode::Create => return Err(OutputError::Exists { path: path.to_owned() }),
+            SetMode::Replace => drop(Manifest::sealed(path)?), // nothing but a set is replaced
+            SetMode::Resume => {
                 let sealed = Manifest::sealed(path)?;
                 sealed.check(plan, path)?;
                 let fault = sealed.chunks.values().flatten().find_map(|sum| sum.fault(path));
@@ -53,27 +58,27 @@ pub(super) fn occupy(path: &Path, plan: &Plan, shard: Shard, start: Start) -> Re
     }
     let is_set = !manifests(&root).map_err(failed)?.is_empty();
     match start {
-        Start::Again if is_set => {
+        SetMode::Replace if is_set => {
             fs::remove_dir_all(&root).and_then(|()| fs::create_dir(&root)).map_err(failed)?;
         }
         // Another process may have made the folder this very moment.
-        Start::New if shard.count > 1 && !root.join(part_name(shard.index, shard.count)).exists() => {}
-        Start::New if is_set => return Err(OutputError::Unfinished { path: path.to_owned(), root }),
-        Start::New | Start::Again | Start::Resume => {}
+        SetMode::Create if shard.count > 1 && !root.join(part_name(shard.index, shard.count)).exists() => {}
+        SetMode::Create if is_set => return Err(OutputError::Unfinished { path: path.to_owned(), root }),
+        SetMode::Create | SetMode::Replace | SetMode::Resume => {}
     }
     Ok(root)
 }
 
 /// Claims a shard of a set that begins, which one process can: of two that start at once, neither sees a manifest of
 /// the other. The name is one that sealing sweeps.
-pub(super) fn claim(path: &Path, root: &Path, shard: Shard, start: Start) -> Result<(), OutputError> {
+pub(super) fn claim(path: &Path, root: &Path, shard: Shard, start: SetMode) -> Result<(), OutputError> {
     let name = format!("{PREFIX}{}{SUFFIX}", part_name(shard.index, shard.count));
     match fs::File::create_new(root.join(name)) {
         Ok(_) => Ok(()),
         Err(e) if e.kind() != io::ErrorKind::AlreadyExists => {
             Err(OutputError::Write { path: path.to_owned(), source: e })
         }
-        Err(_) if start == Start::New => {
+        Err(_) if start == SetMode::Create => {
             Err(OutputError::Unfinished { path: path.to_owned(), root: root.to_owned() })
         }
         Err(_) => Ok(()), // that of a run that was killed
@@ -88,23 +93,23 @@ pub fn merge(path: &Path) -> Result<(), OutputError> {
         None => path,
     };
     match seal(&path, false)? {
-        Outcome::Sealed => Ok(()),
-        Outcome::Waiting { done, chunks } => Err(OutputError::Incomplete { path, done, chunks }),
+        SetStatus::Sealed => Ok(()),
+        SetStatus::Waiting { done, chunks } => Err(OutputError::Incomplete { path, done, chunks }),
     }
 }
 
 /// Joins the manifests of a set's processes and gives the set its name, if all of it is there. Several processes may
 /// do this at once: each step is the same whoever takes it, and can be taken twice.
-pub(super) fn seal(path: &Path, replace: bool) -> Result<Outcome, OutputError> {
+pub(super) fn seal(path: &Path, replace: bool) -> Result<SetStatus, OutputError> {
     let root = partial(path);
     match try_seal(path, &root, replace) {
         // Another process was faster: what was to be renamed has its name.
-        Err(_) if !root.exists() && Manifest::sealed(path).is_ok() => Ok(Outcome::Sealed),
+        Err(_) if !root.exists() && Manifest::sealed(path).is_ok() => Ok(SetStatus::Sealed),
         result => result,
     }
 }
 
-fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<Outcome, OutputError> {
+fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<SetStatus, OutputError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
     let found = if root.is_dir() { Manifest::joined(root)? } else { None };
     let Some(manifest) = found else {
@@ -112,7 +117,7 @@ fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<Outcome, OutputEr
     };
     if !manifest.is_complete() {
         let (done, chunks) = (manifest.chunks.len() as u64, manifest.plan.chunks());
-        return Ok(Outcome::Waiting { done, chunks });
+        return Ok(SetStatus::Waiting { done, chunks });
     }
     // Temporary files are made outside: one that is inside while another process renames would stay there. Theirs is a
     // name that tells them from those of other files in that folder.
@@ -142,5 +147,5 @@ fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<Outcome, OutputEr
     }
     sweep(by, &prefix).map_err(failed)?;
     sync_folder(by);
-    Ok(Outcome::Sealed)
+    Ok(SetStatus::Sealed)
 }

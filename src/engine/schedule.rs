@@ -1,0 +1,107 @@
+//! Several recipes that are drawn together, step by step, and how a range of steps is cut into windows.
+
+use std::time::{Duration, Instant};
+
+use super::{Batch, Device, Engine, EngineError, cpu, gpu};
+use crate::quantity::ArrayFormat;
+use crate::random::stream::DrawRange;
+use crate::recipe::Recipe;
+
+/// The most bytes of a quantity in one window: all windows in flight stay in a cache of 32 MiB.
+const WINDOW_BYTES: u64 = 8 << 20;
+
+/// How long a window should take: short enough for an interrupt and for any watchdog, long enough to hide the cost of
+/// starting one.
+const WINDOW_TIME: Duration = Duration::from_millis(60);
+
+impl Engine {
+    /// Gets ready to draw from several recipes at once. Members of one recipe share its shader.
+    pub(crate) fn schedule(&self, jobs: &[Job]) -> Result<Schedule<'_>, EngineError> {
+        Ok(Schedule(match &self.device {
+            Device::Gpu(gpu) => Backend::Gpu(gpu::GpuSchedule::new(gpu, jobs)?),
+            Device::Cpu(pool) => Backend::Cpu(cpu::CpuSchedule::new(pool, jobs)),
+        }))
+    }
+}
+
+/// A recipe among several that are drawn together, step by step.
+#[derive(Clone, Copy)]
+pub(crate) struct Job<'a> {
+    pub(crate) recipe: &'a Recipe,
+    /// How many draws a step takes, at least 1.
+    pub(crate) per_step: u64,
+}
+
+/// An engine with the jobs of an ensemble.
+pub(crate) struct Schedule<'a>(pub(super) Backend<'a>);
+
+pub(super) enum Backend<'a> {
+    Gpu(gpu::GpuSchedule<'a>),
+    Cpu(cpu::CpuSchedule<'a>),
+}
+
+impl Schedule<'_> {
+    /// Makes the first `steps` steps of each job's draws, and hands them to `sink` window by window, a batch a
+    /// job. A window is one submission for all jobs. Nothing is said of draws that failed.
+    pub(crate) fn draw<E: From<EngineError>>(
+        &mut self,
+        draws: &[DrawRange],
+        steps: u64,
+        mut sink: impl FnMut(&[Batch]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match &mut self.0 {
+            _ if steps == 0 => Ok(()),
+            Backend::Gpu(session) => session.draw(draws, steps, &mut sink),
+            Backend::Cpu(session) => session.draw(draws, steps, &mut sink),
+        }
+    }
+}
+
+/// How many steps the next window should have: grows or shrinks towards [`WINDOW_TIME`].
+pub(super) struct Pace {
+    next: u64,
+    pub(super) most: u64,
+    /// Windows have a multiple of this, so that none leaves half a thread idle and planes have no padding.
+    grain: u64,
+}
+
+impl Pace {
+    /// Windows of at most `most` steps of the jobs, whose `formats` come out. The first has about 10^5 candidates.
+    pub(super) fn new<'a>(jobs: &[Job], formats: impl Iterator<Item = &'a [ArrayFormat]>, most: u64) -> Pace {
+        let four_steps = |(job, formats): (&Job, &'a [ArrayFormat])| {
+            formats.iter().map(|format| format.bytes(4 * job.per_step)).max()
+        };
+        let bytes = jobs.iter().zip(formats).filter_map(four_steps).max().expect("something comes out");
+        let candidates = jobs.iter().map(|job| job.per_step as f64 / job.recipe.acceptance()).sum::<f64>();
+        let grain = if jobs.iter().all(|job| job.per_step == 1) { 4 } else { 1 };
+        let most = most.min(4 * WINDOW_BYTES / bytes).max(grain) / grain * grain;
+        Pace { next: ((1e5 / candidates) as u64).clamp(grain, most), most, grain }
+    }
+
+    /// Learns from a window of `steps` that took until now from `start`.
+    pub(super) fn learn(&mut self, steps: u64, start: Instant) {
+        let ratio = WINDOW_TIME.as_secs_f64() / start.elapsed().as_secs_f64().max(1e-6);
+        let wanted = steps as f64 * ratio.clamp(0.25, 2.0);
+        self.next = (wanted as u64).clamp(self.grain, self.most) / self.grain * self.grain;
+    }
+
+    /// The steps of the next window, of what is left of `steps` from `offset` on.
+    pub(super) fn window(&self, steps: u64, offset: u64) -> Option<Window> {
+        let left = steps - offset;
+        (left > 0).then(|| Window { offset, steps: left.min(self.next) })
+    }
+}
+
+/// Some steps of an ensemble.
+#[derive(Clone, Copy)]
+pub(super) struct Window {
+    pub(super) offset: u64,
+    pub(super) steps: u64,
+}
+
+impl Window {
+    /// The part of a job's draws.
+    pub(super) fn of(self, draws: DrawRange, per_step: u64) -> DrawRange {
+        draws.part(self.offset * per_step, self.steps * per_step)
+    }
+}

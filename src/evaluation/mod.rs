@@ -1,0 +1,9 @@
+//! What examines the project itself: statistics, stiff and extreme cases, costs, and the report that shows them.
+//!
+//! Not for users of the library: nothing here is kept stable.
+
+pub mod costs;
+pub mod plot;
+pub mod report;
+pub mod statistics;
+pub mod stress;

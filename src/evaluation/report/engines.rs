@@ -1,0 +1,152 @@
+//! What draws, in one form: engines in f32, and the CPU in f64.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Bench, ReportError};
+use crate::cpu::Kernel;
+use crate::draw_status::DrawStatus;
+use crate::engine::{Adapter, Batch, Engine, EngineError, Session};
+use crate::evaluation::statistics::rows;
+use crate::random::stream::DrawRange;
+use crate::recipe::Recipe;
+
+/// Draws of a window in f64.
+const WINDOW: u64 = 1 << 15;
+
+/// What drew.
+#[derive(Clone, Debug, Serialize)]
+pub struct EngineFacts {
+    /// What it is called, briefly.
+    pub name: String,
+    /// The floating-point type of its draws.
+    pub precision: &'static str,
+    /// What it is called in full, with the driver.
+    pub description: String,
+    /// The adapter; nothing on the CPU.
+    pub adapter: Option<Adapter>,
+}
+
+/// What draws.
+pub(super) struct Subject {
+    pub(super) facts: EngineFacts,
+    /// Nothing for f64.
+    engine: Option<Engine>,
+}
+
+/// Spectra one after another.
+pub(super) enum Values<'a> {
+    Single(&'a [f32]),
+    Double(&'a [f64]),
+}
+
+impl Subject {
+    pub(super) fn single(engine: Engine) -> Subject {
+        let name = match engine.adapter() {
+            // Drivers say much in brackets.
+            Some(adapter) => adapter.name.split('(').next().unwrap_or_default().trim().to_owned(),
+            None => "CPU".to_owned(),
+        };
+        let facts = EngineFacts {
+            name: format!("{name}, f32"),
+            precision: "f32",
+            description: engine.to_string(),
+            adapter: engine.adapter().cloned(),
+        };
+        Subject { facts, engine: Some(engine) }
+    }
+
+    pub(super) fn double() -> Subject {
+        let facts = EngineFacts {
+            name: "CPU, f64".to_owned(),
+            precision: "f64",
+            description: format!("CPU ({} threads), draw by draw", rayon::current_num_threads()),
+            adapter: None,
+        };
+        Subject { facts, engine: None }
+    }
+
+    /// The engine, where draws are in f32.
+    pub(super) fn engine(&self) -> Option<&Engine> {
+        self.engine.as_ref()
+    }
+
+    pub(super) fn runner<'a>(&'a self, recipe: &'a Recipe) -> Result<Runner<'a>, EngineError> {
+        match &self.engine {
+            Some(engine) => Ok(Runner::Single(engine.session(recipe)?)),
+            None => Ok(Runner::Double(Kernel::new(&recipe.program().spectra_alone()))),
+        }
+    }
+}
+
+/// A target with a recipe.
+pub(super) enum Runner<'a> {
+    Single(Session<'a>),
+    Double(Kernel<f64>),
+}
+
+impl Runner<'_> {
+    /// Makes `draws` and hands them to `sink` in order. Returns how many candidates that took.
+    pub(super) fn draw(
+        &mut self,
+        bench: &Bench,
+        draws: DrawRange,
+        sink: &mut dyn FnMut(Values, &[DrawStatus]),
+    ) -> Result<u64, ReportError> {
+        match self {
+            Runner::Single(session) => {
+                let summary = session.draw(draws, |batch| {
+                    bench.say("")?;
+                    let (values, statuses) = contents(&batch);
+                    sink(Values::Single(values), statuses);
+                    Ok::<_, ReportError>(())
+                })?;
+                Ok(summary.attempts)
+            }
+            Runner::Double(kernel) => {
+                let (mut values, mut statuses, mut attempts) = (Vec::new(), Vec::new(), 0);
+                for offset in (0..draws.count).step_by(WINDOW as usize) {
+                    bench.say("")?;
+                    let part = draws.part(offset, WINDOW.min(draws.count - offset));
+                    fill(kernel, part, &mut values, &mut statuses);
+                    attempts += statuses.iter().map(|t: &DrawStatus| u64::from(t.attempts())).sum::<u64>();
+                    sink(Values::Double(&values), &statuses);
+                }
+                Ok(attempts)
+            }
+        }
+    }
+
+    /// How long `draws` take, when nothing is done with them; and how many candidates they took.
+    pub(super) fn time(&mut self, bench: &Bench, draws: DrawRange) -> Result<(f64, u64), ReportError> {
+        let start = Instant::now();
+        let attempts = self.draw(bench, draws, &mut |_, _| {})?;
+        Ok((start.elapsed().as_secs_f64(), attempts))
+    }
+}
+
+/// The spectra of a batch, and what each draw took.
+fn contents<'b>(batch: &'b Batch) -> (&'b [f32], &'b [DrawStatus]) {
+    debug_assert_eq!(rows(batch).count() as u64, batch.draws.count);
+    (batch.spectra(), batch.statuses())
+}
+
+/// Draws in f64, on all cores.
+pub(super) fn fill(
+    kernel: &Kernel<f64>,
+    draws: DrawRange,
+    values: &mut Vec<f64>,
+    statuses: &mut Vec<DrawStatus>,
+) {
+    let bands = kernel.width();
+    values.resize(draws.count as usize * bands, 0.0);
+    statuses.resize(draws.count as usize, DrawStatus::FAILED);
+    let rows = values.par_chunks_exact_mut(bands).zip(statuses).enumerate();
+    rows.with_min_len(256).for_each(|(i, (row, status))| {
+        let (drawn, took) = kernel.draw(draws.stream, draws.first.wrapping_add(i as u64));
+        row.copy_from_slice(&drawn[0]);
+        *status = took;
+    });
+}

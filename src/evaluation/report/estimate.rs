@@ -1,0 +1,209 @@
+//! Estimates from many draws, how far they are from others, and how sure that is.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::engines::Values;
+use crate::model::Model;
+use crate::random::philox::philox;
+
+/// Resamplings of a confidence interval.
+const RESAMPLINGS: u32 = 1000;
+
+/// A value and its 95 % confidence interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Confidence {
+    /// The value.
+    pub value: f64,
+    /// The lower end.
+    pub low: f64,
+    /// The upper end.
+    pub high: f64,
+}
+
+/// Sums over draws, from which means and covariances come. Values are taken from the model's mean, so that nothing
+/// cancels.
+pub(super) struct Moments<'a> {
+    model: &'a Model,
+    pub(super) draws: u64,
+    pub(super) attempts: u64,
+    bands: Vec<f64>,
+    squares: Vec<f64>,
+    weights: Vec<f64>,
+    /// Products of weights, the lower triangle row by row.
+    products: Vec<f64>,
+}
+
+/// What draws tell of their distribution.
+#[derive(Clone, Debug)]
+pub(super) struct Estimate {
+    pub(super) mean: DVector<f64>,
+    /// Of the weights, k x k.
+    pub(super) covariance: DMatrix<f64>,
+    pub(super) acceptance: f64,
+}
+
+impl<'a> Moments<'a> {
+    pub(super) fn new(model: &'a Model) -> Moments<'a> {
+        let (n, k) = (model.bands(), model.components());
+        Moments {
+            model,
+            draws: 0,
+            attempts: 0,
+            bands: vec![0.0; n],
+            squares: vec![0.0; n],
+            weights: vec![0.0; k],
+            products: vec![0.0; k * (k + 1) / 2],
+        }
+    }
+
+    /// Adds spectra, on all cores.
+    pub(super) fn add(&mut self, values: Values) {
+        let n = self.bands.len();
+        let parts: Vec<_> = match values {
+            Values::Single(values) => values.par_chunks(1024 * n).map(|part| self.of(part)).collect(),
+            Values::Double(values) => values.par_chunks(1024 * n).map(|part| self.of(part)).collect(),
+        };
+        parts.iter().for_each(|part| self.merge(part));
+    }
+
+    fn of<T: Copy + Into<f64>>(&self, values: &[T]) -> Moments<'a> {
+        let mut sums = Moments::new(self.model);
+        let (n, k) = (sums.bands.len(), sums.weights.len());
+        let parts = self.model.parts();
+        // By rows, so that each component's vector is read in one go.
+        let basis: Vec<f64> = parts.basis.transpose().as_slice().to_vec();
+        let (mut centred, mut weights) = (vec![0.0; n], vec![0.0; k]);
+        for row in values.chunks_exact(n) {
+            for (b, (c, &value)) in centred.iter_mut().zip(row).enumerate() {
+                *c = value.into() - parts.mean[b];
+                sums.bands[b] += *c;
+                sums.squares[b] += *c * *c;
+            }
+            for (weight, vector) in weights.iter_mut().zip(basis.chunks_exact(n)) {
+                *weight = vector.iter().zip(&centred).map(|(v, c)| v * c).sum();
+            }
+            let mut product = sums.products.iter_mut();
+            for i in 0..k {
+                sums.weights[i] += weights[i];
+                weights[..=i].iter().zip(&mut product).for_each(|(w, p)| *p += weights[i] * w);
+            }
+        }
+        sums.draws = (values.len() / n) as u64;
+        sums
+    }
+
+    pub(super) fn merge(&mut self, other: &Moments) {
+        let add = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        add(&mut self.bands, &other.bands);
+        add(&mut self.squares, &other.squares);
+        add(&mut self.weights, &other.weights);
+        add(&mut self.products, &other.products);
+        self.draws += other.draws;
+        self.attempts += other.attempts;
+    }
+
+    pub(super) fn estimate(&self) -> Estimate {
+        let n = self.draws as f64;
+        let k = self.weights.len();
+        let product = |i: usize, j: usize| self.products[i * (i + 1) / 2 + j] / n;
+        let covariance = DMatrix::from_fn(k, k, |i, j| {
+            product(i.max(j), i.min(j)) - self.weights[i] * self.weights[j] / n / n
+        });
+        Estimate {
+            mean: &self.model.parts().mean + DVector::from_column_slice(&self.bands) / n,
+            covariance,
+            acceptance: n / self.attempts as f64,
+        }
+    }
+
+    /// The root of the mean variance of a band.
+    pub(super) fn deviation(&self) -> f64 {
+        let n = self.draws as f64;
+        let variances = self.bands.iter().zip(&self.squares).map(|(s, q)| q / n - (s / n).powi(2));
+        (variances.sum::<f64>() / self.bands.len() as f64).sqrt()
+    }
+}
+
+impl Estimate {
+    /// How far this is from another: of the mean spectrum the root mean square over bands, of the covariance the
+    /// Frobenius norm in parts of the other's, and of the acceptance the difference.
+    pub(super) fn errors(&self, other: &Estimate) -> [f64; 3] {
+        [
+            (&self.mean - &other.mean).norm() / (self.mean.len() as f64).sqrt(),
+            (&self.covariance - &other.covariance).norm() / other.covariance.norm(),
+            (self.acceptance - other.acceptance).abs(),
+        ]
+    }
+}
+
+pub(super) fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+pub(super) fn median(values: &[f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The value that a share of all are at most.
+pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted[((sorted.len() as f64 * share) as usize).min(sorted.len() - 1)]
+}
+
+/// A statistic of replicates with its 95 % confidence interval: percentiles over resamplings of the replicates (the
+/// bootstrap). `statistic` is given, for each of several lists, which of its `lengths` replicates to take.
+pub(super) fn bootstrap(lengths: &[usize], statistic: impl Fn(&[Vec<usize>]) -> f64) -> Confidence {
+    let plain: Vec<Vec<usize>> = lengths.iter().map(|&n| (0..n).collect()).collect();
+    let resampled: Vec<f64> = (0..RESAMPLINGS)
+        .map(|round| {
+            let pick = |list: usize, i: usize, n: usize| {
+                let [word, ..] = philox([i as u32, list as u32, round, 0], [0xB007, 0x57A9]);
+                ((u64::from(word) * n as u64) >> 32) as usize
+            };
+            let picks = |(list, &n): (usize, &usize)| (0..n).map(|i| pick(list, i, n)).collect();
+            statistic(&lengths.iter().enumerate().map(picks).collect::<Vec<_>>())
+        })
+        .collect();
+    Confidence {
+        value: statistic(&plain),
+        low: quantile(&resampled, 0.025),
+        high: quantile(&resampled, 0.975),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_are_those_of_the_formulas() {
+        let model = Model::builtin("granada").unwrap();
+        let spectra: Vec<Vec<f64>> = (0..3000)
+            .map(|i| model.reconstruct(&[0, 1, 2, 3, 4, 5].map(|j| ((i * (j + 1)) as f64).sin())))
+            .map(|s| s.as_slice().to_vec())
+            .collect();
+        let mut moments = Moments::new(&model);
+        moments.add(Values::Double(&spectra.concat()));
+        moments.attempts = 6000;
+        let estimate = moments.estimate();
+        let mean = |f: &dyn Fn(usize) -> f64| (0..3000).map(f).sum::<f64>() / 3000.0;
+        let weight = |i: usize, j: usize| ((i * (j + 1)) as f64).sin();
+        let (m1, m2) = (mean(&|i| weight(i, 1)), mean(&|i| weight(i, 2)));
+        let expected = mean(&|i| weight(i, 1) * weight(i, 2)) - m1 * m2;
+        assert!((estimate.covariance[(1, 2)] - expected).abs() < 1e-12);
+        assert!((estimate.mean[7] - mean(&|i| spectra[i][7])).abs() < 1e-12);
+        assert_eq!((estimate.acceptance, estimate.errors(&estimate)), (0.5, [0.0; 3]));
+    }
+
+    #[test]
+    fn an_interval_covers_its_value() {
+        let values: Vec<f64> = (0..20).map(f64::from).collect();
+        let interval = bootstrap(&[20], |picks| picks[0].iter().map(|&i| values[i]).sum::<f64>() / 20.0);
+        assert_eq!(interval.value, 9.5);
+        // A mean of 20 of deviation 5.77 has the standard error 1.29.
+        assert!((interval.low - (9.5 - 2.53)).abs() < 0.4 && (interval.high - (9.5 + 2.53)).abs() < 0.4);
+    }
+}

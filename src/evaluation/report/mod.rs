@@ -1,0 +1,264 @@
+//! The report: what draws cost, how good they are, and how they behave at the edges, on one machine and for its
+//! models.
+//!
+//! [`measure`] makes the numbers, which are a document of their own ([`Report`], as JSON); [`page`] makes of them one
+//! page that needs nothing else, and [`figures`] its plots. Every engine is judged by a reference in f64 that shares no
+//! random word with it, and, value by value, by the f64 draw of the same words.
+
+mod accuracy;
+mod chart;
+mod convergence;
+mod difficulty;
+mod engines;
+mod estimate;
+mod fidelity;
+mod figures;
+mod functions;
+mod page;
+mod randomness;
+mod summary;
+
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use serde::Serialize;
+
+pub use accuracy::{Accuracy, Errors, Variant};
+pub use convergence::{Convergence, Merit, Point, Reference};
+pub use difficulty::{Difficulty, Task};
+pub use engines::EngineFacts;
+pub use estimate::Confidence;
+pub use fidelity::{AboveOne, Fidelity, Shrinkage, Spread};
+pub use figures::{Figure, figures};
+pub use functions::Functions;
+pub use page::page;
+pub use randomness::{CheckRow, GroupRow, Randomness};
+pub use summary::Verdict;
+
+use crate::engine::{Engine, EngineChoice, EngineError};
+use crate::evaluation::stress::{self, Outcome};
+use crate::model::Model;
+use crate::recipe::{Recipe, RecipeError};
+use engines::Subject;
+
+/// How much to measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Effort {
+    /// Up to 10^6 draws: under a minute on 2 cores.
+    Quick,
+    /// Up to 10^7: minutes.
+    Usual,
+    /// Up to 10^8: the better part of an hour.
+    Full,
+}
+
+impl Effort {
+    /// One of three values.
+    fn pick<T>(self, quick: T, usual: T, full: T) -> T {
+        match self {
+            Effort::Quick => quick,
+            Effort::Usual => usual,
+            Effort::Full => full,
+        }
+    }
+}
+
+/// What to report on.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Models, and what to call them.
+    pub models: Vec<(String, Model)>,
+    /// What draws in f32; the CPU in f64 is always there beside it.
+    pub engines: Vec<EngineChoice>,
+    /// How much to measure.
+    pub effort: Effort,
+    /// The seed of all random numbers.
+    pub seed: u64,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// An engine cannot be opened, or failed.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// A model has no plain draws.
+    #[error(transparent)]
+    Recipe(#[from] RecipeError),
+    /// The caller's watch said so.
+    #[error("stopped")]
+    Stopped,
+    /// A plot cannot be drawn.
+    #[error("cannot draw {0}")]
+    Plot(String),
+}
+
+/// Says from time to time what is being done; `false` from it ends the work with [`ReportError::Stopped`].
+pub type Watch<'a> = &'a dyn Fn(&str) -> bool;
+
+/// All numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The version of the program.
+    pub version: &'static str,
+    /// When the measurements began, UTC.
+    pub date: String,
+    /// How long they took, seconds.
+    pub seconds: f64,
+    /// How much was measured.
+    pub effort: Effort,
+    /// The seed of all random numbers.
+    pub seed: u64,
+    /// The cores that the operating system gives.
+    pub cores: usize,
+    /// What drew.
+    pub engines: Vec<EngineFacts>,
+    /// What was found for each model.
+    pub models: Vec<ModelReport>,
+    /// The generator, and the distribution of draws.
+    pub randomness: Randomness,
+    /// The stiff and extreme cases, for each engine that ran them.
+    pub stress: Vec<StressRun>,
+}
+
+/// What was found for a model.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelReport {
+    /// What the model is called.
+    pub name: String,
+    /// Illuminants or reflectances.
+    pub kind: crate::SpectrumKind,
+    /// The wavelengths, nm.
+    pub grid: String,
+    /// The number of bands.
+    pub bands: usize,
+    /// The number of components.
+    pub components: usize,
+    /// Statistical error against run time.
+    pub convergence: Convergence,
+    /// Numerical error against cost.
+    pub accuracy: Accuracy,
+    /// Cost against difficulty.
+    pub difficulty: Difficulty,
+    /// Fidelity to the method.
+    pub fidelity: Fidelity,
+}
+
+/// The stiff and extreme cases on an engine.
+#[derive(Clone, Debug, Serialize)]
+pub struct StressRun {
+    /// The engine, as an index into [`Report::engines`].
+    pub engine: usize,
+    /// What came of each case.
+    pub outcomes: Vec<Outcome>,
+}
+
+/// What all measurements share.
+struct Bench<'a> {
+    targets: Vec<Subject>,
+    effort: Effort,
+    seed: u64,
+    watch: Watch<'a>,
+}
+
+impl Bench<'_> {
+    fn say(&self, what: &str) -> Result<(), ReportError> {
+        if (self.watch)(what) { Ok(()) } else { Err(ReportError::Stopped) }
+    }
+}
+
+/// Makes all measurements.
+pub fn measure(options: &Options, watch: Watch) -> Result<Report, ReportError> {
+    let (start, date) = (Instant::now(), date());
+    let mut targets = Vec::new();
+    for choice in &options.engines {
+        targets.push(Subject::single(Engine::new(choice)?));
+    }
+    targets.push(Subject::double());
+    let bench = Bench { targets, effort: options.effort, seed: options.seed, watch };
+    let mut models = Vec::new();
+    for (name, model) in &options.models {
+        models.push(report_model(&bench, name, model)?);
+    }
+    let randomness = randomness::measure(&bench, &options.models)?;
+    let stress = stress(&bench)?;
+    Ok(Report {
+        version: env!("CARGO_PKG_VERSION"),
+        date,
+        seconds: start.elapsed().as_secs_f64(),
+        effort: options.effort,
+        seed: options.seed,
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        engines: bench.targets.iter().map(|target| target.facts.clone()).collect(),
+        models,
+        randomness,
+        stress,
+    })
+}
+
+fn report_model(bench: &Bench, name: &str, model: &Model) -> Result<ModelReport, ReportError> {
+    let recipe = Recipe::builder(model).build()?;
+    let convergence = convergence::measure(bench, name, &recipe)?;
+    Ok(ModelReport {
+        name: name.to_owned(),
+        kind: model.kind(),
+        grid: model.grid().to_string(),
+        bands: model.bands(),
+        components: model.components(),
+        accuracy: accuracy::measure(bench, name, &recipe, &convergence)?,
+        difficulty: difficulty::measure(bench, name, model)?,
+        fidelity: fidelity::measure(bench, name, model)?,
+        convergence,
+    })
+}
+
+/// Compiling some forty shaders would take most of a quick report: that runs the cases on the CPU alone.
+fn stress(bench: &Bench) -> Result<Vec<StressRun>, ReportError> {
+    let mut runs = Vec::new();
+    for (index, target) in bench.targets.iter().enumerate() {
+        let Some(engine) = target.engine() else { continue };
+        if bench.effort == Effort::Quick && engine.adapter().is_some() {
+            continue;
+        }
+        let mut outcomes = Vec::new();
+        for case in stress::cases() {
+            bench.say(&format!("{}: {}", target.facts.name, case.name))?;
+            outcomes.push(case.run(engine));
+        }
+        runs.push(StressRun { engine: index, outcomes });
+    }
+    Ok(runs)
+}
+
+/// Now, as `2026-11-23 14:05 UTC`, in the proleptic Gregorian calendar.
+fn date() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let [year, month, day] = civil(seconds / 86_400);
+    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
+    format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
+
+/// Year, month and day of a day since 1970-01-01. Years begin in March here, so that the leap day is the last.
+fn civil(days: u64) -> [u64; 3] {
+    let days = days + 719_468; // since 0000-03-01
+    let (era, day_of_era) = (days / 146_097, days % 146_097);
+    let year = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year + year / 4 - year / 100);
+    let month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month + 2) / 5 + 1;
+    let month = if month < 10 { month + 3 } else { month - 9 };
+    [year + era * 400 + u64::from(month <= 2), month, day]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn days_have_dates() {
+        assert_eq!(civil(0), [1970, 1, 1]);
+        assert_eq!(civil(11_016), [2000, 2, 29]);
+        assert_eq!(civil(20_780), [2026, 11, 23]);
+    }
+}

@@ -1,0 +1,3 @@
+//! From a recipe or a scene to a file or a set of chunks.
+
+pub mod provenance;

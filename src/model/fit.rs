@@ -1,0 +1,225 @@
+//! The fit of a [`Model`] to a [`Dataset`] (Singh et al. 2018, appendix, eq. 1-4 and 6-7): principal components by a
+//! singular value decomposition, in f64.
+
+use nalgebra::{DMatrix, DVector, SVD};
+
+use crate::dataset::{Dataset, SpectrumKind};
+use crate::model::{MAX_COMPONENTS, Model, ModelParts, Normalization};
+
+/// How to fit.
+///
+/// ```
+/// use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, Grid, SpectrumKind};
+///
+/// let data = Dataset::new(&[BuiltinTable::Munsell.table()], Grid::DEFAULT, Extrapolation::Error)?;
+/// let model = Fit::new(SpectrumKind::Reflectance).components(3).fit(&data)?;
+/// assert_eq!(model.components(), 3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Fit {
+    kind: SpectrumKind,
+    components: usize,
+    normalization: Normalization,
+}
+
+/// Why a model cannot be fitted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what the fields are
+pub enum FitError {
+    #[error("a model of {0} components: it needs at least 1 component, and has at most {MAX_COMPONENTS}")]
+    Components(usize),
+    #[error("{components} components need at least {} spectra, and there are {spectra}: ask for fewer with -k", components + 1)]
+    TooFewSpectra { components: usize, spectra: usize },
+    #[error("all {spectra} spectra are identical: there is no variation to model")]
+    NoVariation { spectra: usize },
+    #[error(
+        "the data have rank {rank}, which is less than {components} components: ask for -k {rank} or fewer"
+    )]
+    Rank { components: usize, rank: usize },
+    #[error(
+        "{place}: its mean power is {power}, and only a positive one can be normalised; remove it or pass --normalize none"
+    )]
+    Power { place: String, power: f64 },
+    #[error(
+        "reflectances of {mean:.4} on average, where they are between 0 and 1: divide percents by 100, or fit these as \
+         illuminants"
+    )]
+    NotReflectances { mean: f64 },
+    #[error("the values are too large or too small to square in f64: rescale the data, or normalise")]
+    Scale,
+}
+
+impl Fit {
+    /// A fit of 6 components; illuminants are divided by their mean power, reflectances are left alone.
+    pub fn new(kind: SpectrumKind) -> Fit {
+        let normalization = match kind {
+            SpectrumKind::Illuminant => Normalization::Mean,
+            SpectrumKind::Reflectance => Normalization::None,
+        };
+        Fit { kind, components: 6, normalization }
+    }
+
+    /// Keeps `components` principal components (k).
+    pub fn components(self, components: usize) -> Fit {
+        Fit { components, ..self }
+    }
+
+    /// Divides each spectrum by `normalization` first.
+    pub fn normalization(self, normalization: Normalization) -> Fit {
+        Fit { normalization, ..self }
+    }
+
+    /// Fits the model.
+    pub fn fit(&self, data: &Dataset) -> Result<Model, FitError> {
+        let k = self.components;
+        let (bands, spectra) = data.spectra().shape();
+        if !(1..=MAX_COMPONENTS).contains(&k) {
+            return Err(FitError::Components(k));
+        }
+        if spectra < k + 1 {
+            return Err(FitError::TooFewSpectra { components: k, spectra });
+        }
+        let (mut centred, powers) = self.normalized(data)?;
+        let mean = centred.mean();
+        if self.kind == SpectrumKind::Reflectance && mean.is_finite() && mean > 1.0 {
+            return Err(FitError::NotReflectances { mean });
+        }
+        let mean = centred.column_mean(); // eq. 2, 6
+        centred.column_iter_mut().for_each(|mut spectrum| spectrum -= &mean);
+
+        // A decomposition of what is not finite would not end.
+        if !centred.iter().chain(&mean).all(|v| v.is_finite()) {
+            return Err(FitError::Scale);
+        }
+        // Spectra that differ by no more than rounding do not differ. A mean is as good as the sum that it comes from.
+        let size = mean.amax().max(centred.amax());
+        let rounding = size * f64::EPSILON * spectra as f64;
+        if centred.amax() <= rounding {
+            return Err(FitError::NoVariation { spectra });
+        }
+        // Squares of the data must neither overflow nor vanish; scaling by a power of two costs no digits.
+        let scale = 2f64.powi(-(centred.amax().log2().floor() as i32));
+        if !scale.is_finite() {
+            return Err(FitError::Scale);
+        }
+        let (singular, basis) = decompose(centred * scale);
+        let singular = singular / scale;
+        let largest = singular[0] * singular[0];
+        if largest == 0.0 || !largest.is_finite() {
+            return Err(FitError::Scale);
+        }
+        // As MATLAB's and NumPy's rank: what rounding alone can leave is not a component.
+        let noise = bands.max(spectra) as f64 * f64::EPSILON * singular[0].max(size);
+        let rank = singular.iter().filter(|&&s| s > noise).count();
+        if k > rank {
+            return Err(FitError::Rank { components: k, rank });
+        }
+        let total: f64 = singular.iter().map(|s| s * s).sum();
+        // In the principal frame the weights have mean zero and a diagonal covariance (eq. 4, with 1/M).
+        let variances = singular.rows(0, k).map(|s| s * s / spectra as f64);
+        Ok(Model::new(ModelParts {
+            kind: self.kind,
+            grid: data.grid(),
+            mean,
+            basis: basis.rows(0, k).into_owned(),
+            weight_mean: DVector::zeros(k),
+            weight_covariance: DMatrix::from_diagonal(&variances),
+            explained_variance: singular.iter().take(k).map(|s| s * s / total).collect(),
+            normalization: self.normalization,
+            powers,
+            sources: data.sources().to_vec(),
+        })
+        .expect("singular vectors are orthonormal and variances are not negative"))
+    }
+
+    /// The spectra, a column each, divided by what `normalization` says (eq. 1), and what that was.
+    fn normalized(&self, data: &Dataset) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
+        let mut spectra = data.spectra().clone();
+        let mut powers = Vec::new();
+        for (i, mut spectrum) in spectra.column_iter_mut().enumerate() {
+            let mean = spectrum.mean();
+            let divisor = match self.normalization {
+                Normalization::None => continue,
+                Normalization::Mean => mean,
+                Normalization::Integral => spectrum.sum() * data.grid().step(),
+            };
+            if !(mean > 0.0 && divisor.is_finite()) {
+                return Err(FitError::Power { place: data.place(i), power: mean });
+            }
+            spectrum /= divisor;
+            powers.push(divisor);
+        }
+        Ok((spectra, powers))
+    }
+}
+
+/// The singular values in falling order, and the vectors in band space that belong to them, a row each, with the
+/// largest entry of each made positive: a decomposition leaves the signs open, and a fit must be reproducible.
+fn decompose(columns: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    let svd = SVD::new(columns, true, false); // sorts
+    let mut basis = svd.u.expect("it was asked for").transpose();
+    for mut vector in basis.row_iter_mut() {
+        let largest = vector.iter().copied().fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
+        if largest < 0.0 {
+            vector.neg_mut();
+        }
+    }
+    (svd.singular_values, basis)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Table;
+    use crate::grid::{Extrapolation, Grid};
+
+    #[test]
+    fn percents_are_no_reflectances() {
+        let percents: Vec<_> =
+            (0..9).map(|i| vec![40.0 + f64::from(i), 50.0, 60.0 - f64::from(i * i)]).collect();
+        let table = Table::new("percents.csv", vec![400.0, 410.0, 420.0], &percents).unwrap();
+        let data = Dataset::new(&[table], Grid::new(400.0, 10.0, 3).unwrap(), Extrapolation::Error).unwrap();
+        let message = Fit::new(SpectrumKind::Reflectance).components(2).fit(&data).unwrap_err().to_string();
+        assert!(message.contains("divide percents by 100"), "{message}");
+        assert!(Fit::new(SpectrumKind::Illuminant).components(2).fit(&data).is_ok());
+    }
+
+    #[test]
+    fn a_spectrum_that_cannot_be_normalised_is_named_by_its_source() {
+        let wavelengths = vec![400.0, 410.0, 420.0];
+        let table = |name, spectra: &[[f64; 3]]| {
+            let spectra: Vec<_> = spectra.iter().map(|s| s.to_vec()).collect();
+            Table::new(name, wavelengths.clone(), &spectra).unwrap()
+        };
+        let tables = [
+            table("a.csv", &[[1.0, 2.0, 3.0], [2.0, 1.0, 1.0]]),
+            table("b.csv", &[[1.0, 1.0, 2.0], [0.0; 3]]),
+        ];
+        let data = Dataset::new(&tables, Grid::new(400.0, 10.0, 3).unwrap(), Extrapolation::Error).unwrap();
+        let fit =
+            Fit::new(SpectrumKind::Illuminant).components(1).normalization(Normalization::Mean).fit(&data);
+        let message = fit.unwrap_err().to_string();
+        assert!(message.contains("spectrum 2 of b.csv") && !message.contains("a.csv"), "{message}");
+    }
+
+    /// Finite, but not once they are centred, scaled or divided: a decomposition of such data would never end.
+    #[test]
+    fn data_at_the_ends_of_f64_are_refused() {
+        for (size, normalization) in
+            [(1e-310, Normalization::None), (1.7e308, Normalization::None), (1e-320, Normalization::Mean)]
+        {
+            let spectra: Vec<_> = (0..9)
+                .map(|i| (0..4).map(|b| if (i + b) % 3 == 0 { size } else { -size / 2.0 }).collect())
+                .collect();
+            let wavelengths = vec![400.0, 410.0, 420.0, 430.0];
+            let table = Table::new("extremes", wavelengths, &spectra).unwrap();
+            let data =
+                Dataset::new(&[table], Grid::new(400.0, 10.0, 4).unwrap(), Extrapolation::Error).unwrap();
+            let fit =
+                Fit::new(SpectrumKind::Reflectance).components(2).normalization(normalization).fit(&data);
+            assert!(matches!(fit, Err(FitError::Scale | FitError::Power { .. })), "{size:e}: {fit:?}");
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! A fitted model, its file format, and the models that are built in.
+//!
+//! A model is checked when it is made, whether by a fit, from a file or by hand, so what holds one may rely on its
+//! shapes, on an orthonormal basis and on a covariance that has a square root.
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use serde::{Deserialize, Serialize};
+
+mod builtin;
+mod fit;
+
+pub use fit::{Fit, FitError};
+
+use crate::dataset::SpectrumKind;
+use crate::grid::{Grid, GridError};
+
+/// The most components a model may have: what the counter layout of a draw has blocks for (see
+/// [`Stream::block`](crate::Stream::block)).
+pub const MAX_COMPONENTS: usize = 1000;
+
+/// The version of the file format that this program writes, and the newest that it reads.
+const SCHEMA: u32 = 1;
+
+/// What each spectrum was divided by before the fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Normalization {
+    /// Its mean power over the grid (eq. 1).
+    Mean,
+    /// Its integral over the grid: the sum of its values times the step in nm.
+    Integral,
+    /// Nothing.
+    None,
+}
+
+/// A Gaussian model of spectra: a spectrum is mean + sum over components of weight x basis vector, and the weights
+/// are normal with a mean and a covariance (Singh et al. 2018, appendix, eq. 2-8).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    parts: ModelParts,
+}
+
+/// What a model consists of; [`Model::new`] checks it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelParts {
+    /// What the spectra are.
+    pub kind: SpectrumKind,
+    /// The wavelengths, n of them.
+    pub grid: Grid,
+    /// The mean spectrum, n values.
+    pub mean: DVector<f64>,
+    /// k orthonormal rows of n values.
+    pub basis: DMatrix<f64>,
+    /// The mean of the weights, k values.
+    pub weight_mean: DVector<f64>,
+    /// The covariance of the weights, k x k, positive semi-definite.
+    pub weight_covariance: DMatrix<f64>,
+    /// The share of the data's variance that each component explains, k values.
+    pub explained_variance: Vec<f64>,
+    /// What the spectra were divided by.
+    pub normalization: Normalization,
+    /// What each of the spectra was divided by, positive; none where that is not known or nothing was.
+    pub powers: Vec<f64>,
+    /// Where the data came from, a line each.
+    pub sources: Vec<String>,
+}
+
+/// Why something is not a model.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what the fields are
+pub enum ModelError {
+    #[error("cannot read model {path}: {source}")]
+    Read { path: String, source: std::io::Error },
+    #[error("{path} is not a model file: {source}")]
+    Json { path: String, source: serde_json::Error },
+    #[error("{path} is a model of schema {found}, and this program reads up to {SCHEMA}: update spectroll")]
+    Schema { path: String, found: u32 },
+    #[error("{path}: {source}")]
+    Invalid { path: String, source: Box<ModelError> },
+    #[error("the wavelengths are not a grid: {0}")]
+    Grid(#[from] GridError),
+    #[error("{field} has {found} values where the rest of the model needs {expected}")]
+    Shape { field: &'static str, found: usize, expected: usize },
+    #[error("{field} holds {value}; every value must be finite")]
+    NotFinite { field: &'static str, value: f64 },
+    #[error(
+        "a model has 1 to {MAX_COMPONENTS} components, and no more than bands; this one has {components} for {bands} bands"
+    )]
+    Components { components: usize, bands: usize },
+    #[error(
+        "basis vectors {row} and {column} have the product {product} where an orthonormal basis has {expected} (to 1e-9)"
+    )]
+    NotOrthonormal { row: usize, column: usize, product: f64, expected: f64 },
+    #[error("powers holds {0}; what spectra are divided by is finite and above 0")]
+    Power(f64),
+    #[error("weight_covariance is not symmetric: entries {row},{column} and {column},{row} differ")]
+    NotSymmetric { row: usize, column: usize },
+    #[error(
+        "weight_covariance is not positive semi-definite: it has the eigenvalue {smallest} beside {largest}"
+    )]
+    NotPositive { smallest: f64, largest: f64 },
+    #[error("there is no built-in model {name:?}; there are {}", Model::BUILTIN.join(", "))]
+    NoBuiltin { name: String },
+}
+
+impl Model {
+    /// A model of these parts.
+    pub fn new(mut parts: ModelParts) -> Result<Model, ModelError> {
+        let (k, n) = (parts.basis.nrows(), parts.grid.len());
+        if k == 0 || k > n.min(MAX_COMPONENTS) {
+            return Err(ModelError::Components { components: k, bands: n });
+        }
+        let fields: [(&str, &[f64], usize); 5] = [
+            ("mean", parts.mean.as_slice(), n),
+            ("basis", parts.basis.as_slice(), k * n),
+            ("weight_mean", parts.weight_mean.as_slice(), k),
+            ("weight_covariance", parts.weight_covariance.as_slice(), k * k),
+            ("explained_variance", &parts.explained_variance, k),
+        ];
+        for (field, values, expected) in fields {
+            if values.len() != expected {
+                return Err(ModelError::Shape { field, found: values.len(), expected });
+            }
+            if let Some(&value) = values.iter().find(|v| !v.is_finite()) {
+                return Err(ModelError::NotFinite { field, value });
+            }
+        }
+        if parts.weight_covariance.nrows() != k {
+            let found = parts.weight_covariance.nrows();
+            return Err(ModelError::Shape { field: "a column of weight_covariance", found, expected: k });
+        }
+        if let Some(&value) = parts.powers.iter().find(|power| !(power.is_finite() && **power > 0.0)) {
+            return Err(ModelError::Power(value));
+        }
+        check_orthonormal(&parts.basis)?;
+        check_covariance(&parts.weight_covariance)?;
+        // Halves that agree to rounding are made to agree exactly, so that a factor of either is the same.
+        parts.weight_covariance = &parts.weight_covariance / 2.0 + parts.weight_covariance.transpose() / 2.0;
+        Ok(Model { parts })
+    }
+
+    /// Reads a model file.
+    pub fn load(path: &Path) -> Result<Model, ModelError> {
+        let name = path.display().to_string();
+        let text =
+            fs::read_to_string(path).map_err(|source| ModelError::Read { path: name.clone(), source })?;
+        Model::from_json(&name, &text)
+    }
+
+    /// Reads the text of a model file; `path` is what messages call it.
+    pub fn from_json(path: &str, text: &str) -> Result<Model, ModelError> {
+        let json = |source| ModelError::Json { path: path.to_owned(), source };
+        let Version { schema } = serde_json::from_str(text).map_err(json)?;
+        if schema > SCHEMA {
+            return Err(ModelError::Schema { path: path.to_owned(), found: schema });
+        }
+        let file: File = serde_json::from_str(text).map_err(json)?;
+        let invalid = |e| ModelError::Invalid { path: path.to_owned(), source: Box::new(e) };
+        file.into_parts().and_then(Model::new).map_err(invalid)
+    }
+
+    /// The text of a model file. Reading it gives the same model, to the last bit.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(&File::from_parts(&self.parts))
+            .expect("numbers and strings are always JSON")
+    }
+
+    /// What the model consists of.
+    pub fn parts(&self) -> &ModelParts {
+        &self.parts
+    }
+
+    /// What the spectra are.
+    pub fn kind(&self) -> SpectrumKind {
+        self.parts.kind
+    }
+
+    /// The wavelengths.
+    pub fn grid(&self) -> Grid {
+        self.parts.grid
+    }
+
+    /// The number of wavelengths, n.
+    pub fn bands(&self) -> usize {
+        self.parts.grid.len()
+    }
+
+    /// The number of components, k.
+    pub fn components(&self) -> usize {
+        self.parts.basis.nrows()
+    }
+
+    /// The weights of a spectrum (n values): basis . (spectrum - mean), eq. 3 and 7.
+    pub fn project(&self, spectrum: &[f64]) -> DVector<f64> {
+        &self.parts.basis * (DVector::from_column_slice(spectrum) - &self.parts.mean)
+    }
+
+    /// The spectrum of weights (k values): mean + weights . basis, eq. 5 and 8.
+    pub fn reconstruct(&self, weights: &[f64]) -> DVector<f64> {
+        &self.parts.mean + self.parts.basis.transpose() * DVector::from_column_slice(weights)
+    }
+
+    /// The factor that turns k standard normals into centred weights: a square root of the covariance. Diagonal where
+    /// the covariance is; else the symmetric root, which exists where a Cholesky factor does not (deficient rank).
+    pub fn weight_factor(&self) -> DMatrix<f64> {
+        let covariance = &self.parts.weight_covariance;
+        if is_diagonal(covariance) {
+            return covariance.map(|v| v.max(0.0).sqrt());
+        }
+        let eigen = SymmetricEigen::new(covariance.clone());
+        let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        &eigen.eigenvectors * DMatrix::from_diagonal(&roots) * eigen.eigenvectors.transpose()
+    }
+}
+
+fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
+    matrix.row_iter().enumerate().all(|(i, row)| row.iter().enumerate().all(|(j, &v)| i == j || v == 0.0))
+}
+
+fn check_orthonormal(basis: &DMatrix<f64>) -> Result<(), ModelError> {
+    let products = basis * basis.transpose();
+    for (row, column) in (0..basis.nrows()).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+        let (product, expected) = (products[(row, column)], f64::from(row == column));
+        if (product - expected).abs() > 1e-9 {
+            return Err(ModelError::NotOrthonormal { row: row + 1, column: column + 1, product, expected });
+        }
+    }
+    Ok(())
+}
+
+/// Symmetric and positive semi-definite, to rounding: 1e-9 of the largest entry or eigenvalue.
+fn check_covariance(covariance: &DMatrix<f64>) -> Result<(), ModelError> {
+    let tolerance = 1e-9 * covariance.amax();
+    let asymmetry = covariance - covariance.transpose();
+    if asymmetry.amax() > tolerance {
+        let (row, column) = asymmetry.iamax_full();
+        return Err(ModelError::NotSymmetric { row: row + 1, column: column + 1 });
+    }
+    let eigenvalues = covariance.symmetric_eigenvalues();
+    let (smallest, largest) = (eigenvalues.min(), eigenvalues.amax());
+    if smallest < -1e-9 * largest {
+        return Err(ModelError::NotPositive { smallest, largest });
+    }
+    Ok(())
+}
+
+/// The version alone: read first, so that a newer file is told from a broken one.
+#[derive(Deserialize)]
+struct Version {
+    schema: u32,
+}
+
+/// A model file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    schema: u32,
+    kind: SpectrumKind,
+    wavelengths: Vec<f64>,
+    mean: Vec<f64>,
+    basis: Vec<Vec<f64>>,
+    weight_mean: Vec<f64>,
+    weight_covariance: Vec<Vec<f64>>,
+    explained_variance: Vec<f64>,
+    normalization: Normalization,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    powers: Vec<f64>,
+    sources: Vec<String>,
+}
+
+impl File {
+    fn from_parts(parts: &ModelParts) -> File {
+        let rows = |m: &DMatrix<f64>| m.row_iter().map(|row| row.iter().copied().collect()).collect();
+        File {
+            schema: SCHEMA,
+            kind: parts.kind,
+            wavelengths: parts.grid.wavelengths().collect(),
+            mean: parts.mean.as_slice().to_vec(),
+            basis: rows(&parts.basis),
+            weight_mean: parts.weight_mean.as_slice().to_vec(),
+            weight_covariance: rows(&parts.weight_covariance),
+            explained_variance: parts.explained_variance.clone(),
+            normalization: parts.normalization,
+            powers: parts.powers.clone(),
+            sources: parts.sources.clone(),
+        }
+    }
+
+    fn into_parts(self) -> Result<ModelParts, ModelError> {
+        if self.basis.is_empty() {
+            return Err(ModelError::Components { components: 0, bands: self.wavelengths.len() });
+        }
+        Ok(ModelParts {
+            kind: self.kind,
+            basis: matrix("basis", &self.basis, self.wavelengths.len())?,
+            weight_covariance: matrix("weight_covariance", &self.weight_covariance, self.basis.len())?,
+            grid: Grid::from_wavelengths(&self.wavelengths)?,
+            mean: self.mean.into(),
+            weight_mean: self.weight_mean.into(),
+            explained_variance: self.explained_variance,
+            normalization: self.normalization,
+            powers: self.powers,
+            sources: self.sources,
+        })
+    }
+}
+
+/// A matrix of rows that must each have `columns` values.
+fn matrix(field: &'static str, rows: &[Vec<f64>], columns: usize) -> Result<DMatrix<f64>, ModelError> {
+    match rows.iter().find(|row| row.len() != columns) {
+        Some(row) => Err(ModelError::Shape { field, found: row.len(), expected: columns }),
+        None => Ok(DMatrix::from_row_iterator(rows.len(), columns, rows.iter().flatten().copied())),
+    }
+}

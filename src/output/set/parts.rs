@@ -1,0 +1,54 @@
+//! A folder of small files: each chunk of draws is one of its own, in `.npy` (one for each quantity) or `.parquet`.
+
+use std::io;
+
+use super::super::npy;
+use super::super::schema::{Schema, SharedArray};
+use super::Part;
+
+/// The `.npy` files of one chunk.
+pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Result<Vec<Part<'static>>> {
+    schema
+        .fields
+        .iter()
+        .zip(columns)
+        .map(|(field, column)| {
+            let shape = field.shape((column.len() / field.delivered_bytes()) as u64);
+            let bytes = npy::file(npy::type_string(field.stored), &shape, &field.store(column)?)?;
+            Ok(Part { name: format!("{}-{index:06}.npy", field.name), bytes: bytes.into() })
+        })
+        .collect()
+}
+
+/// What the `.npy` files leave unsaid.
+pub(super) fn npy_metadata(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
+    let bytes: Vec<u8> = schema.wavelengths.iter().flat_map(|w| w.to_le_bytes()).collect();
+    let bytes = npy::file("<f8", &[schema.wavelengths.len() as u64], &bytes)?;
+    Ok(vec![Part { name: "wavelengths.npy".to_owned(), bytes: bytes.into() }])
+}
+
+/// The `.npy` files of what all draws share.
+pub(super) fn npy_constants(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
+    let part = |constant: &SharedArray| {
+        let bytes = npy::file(npy::type_string(constant.element), &constant.shape(), &constant.bytes)?;
+        Ok(Part { name: format!("{}.npy", constant.name), bytes: bytes.into() })
+    };
+    schema.constants.iter().map(part).collect()
+}
+
+/// The `.parquet` file of one chunk.
+#[cfg(feature = "parquet")]
+pub(super) fn parquet(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Result<Vec<Part<'static>>> {
+    use crate::output::Encoder;
+
+    let mut bytes = Vec::new();
+    let mut encoder = Box::new(super::super::parquet::Parquet::begin(&mut bytes, schema)?);
+    encoder.write(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>())?;
+    encoder.finish()?;
+    Ok(vec![Part { name: format!("part-{index:06}.parquet"), bytes: bytes.into() }])
+}
+
+#[cfg(not(feature = "parquet"))]
+pub(super) fn parquet(_: &Schema, _: u64, _: &[Vec<u8>]) -> io::Result<Vec<Part<'static>>> {
+    unreachable!("Layout::check refuses what was not compiled in")
+}

@@ -1,0 +1,133 @@
+//! A model's Gaussian, given the tristimulus values of its spectra.
+//!
+//! Tristimulus values are linear in the standard normals of a draw: xyz = a + A z, where A has 3 rows. Given xyz, z is
+//! normal on an affine subspace: z = z0 + N y, where z0 = A^+ (xyz - a) is its shortest point, the columns of N are an
+//! orthonormal basis of the directions that leave xyz alone, and y are k - 3 standard normals. That is the conditional
+//! mean and covariance in closed form, in the frame where the covariance is 1; all else that is linear in z follows.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::affine::Affine;
+
+/// Singular values below this part of the largest do not count: the tristimulus values do not vary freely.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// What giving tristimulus values does to the normals of a model.
+#[derive(Clone, Debug)]
+pub(crate) struct Condition {
+    /// a, the tristimulus values at z = 0.
+    at_zero: DVector<f64>,
+    /// A^+, k rows of 3.
+    inverse: DMatrix<f64>,
+    /// N, k rows of k - 3.
+    free: DMatrix<f64>,
+}
+
+impl Condition {
+    /// Of the map of the tristimulus values. `None` where they cannot be given freely, or where nothing is left to
+    /// draw: with 3 components or fewer, or a covariance that varies in fewer than 4 directions.
+    pub(crate) fn new(xyz: &Affine) -> Option<Condition> {
+        let k = xyz.gain.len();
+        if k < 4 {
+            return None;
+        }
+        let map = DMatrix::from_fn(3, k, |row, column| xyz.gain[column][row]);
+        let svd = map.svd(true, true);
+        let largest = svd.singular_values.max();
+        if largest == 0.0 || svd.singular_values.min() < NEGLIGIBLE * largest {
+            return None;
+        }
+        let rows = svd.v_t.clone().expect("it was asked for");
+        Some(Condition {
+            at_zero: DVector::from_column_slice(&xyz.offset),
+            inverse: svd.pseudo_inverse(0.0).expect("both sides were asked for"),
+            free: complement(&rows),
+        })
+    }
+
+    /// A map of z as one of y, given these tristimulus values.
+    pub(crate) fn given(&self, xyz: [f64; 3], map: &Affine) -> Affine {
+        let origin = &self.inverse * (DVector::from_column_slice(&xyz) - &self.at_zero);
+        let mix = |by: &[f64]| {
+            let mut sum = vec![0.0; map.offset.len()];
+            for (gain, by) in map.gain.iter().zip(by) {
+                sum.iter_mut().zip(gain).for_each(|(sum, gain)| *sum += gain * by);
+            }
+            sum
+        };
+        let offset = map.offset.iter().zip(mix(origin.as_slice())).map(|(offset, by)| offset + by).collect();
+        Affine { offset, gain: self.free.column_iter().map(|column| mix(column.as_slice())).collect() }
+    }
+}
+
+/// Orthonormal columns that are orthogonal to the orthonormal `rows`: what is left of the unit vectors, the longest
+/// first. Each is made orthogonal twice, which is enough (Parlett 1998, section 6.9).
+fn complement(rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let k = rows.ncols();
+    let mut found: Vec<DVector<f64>> = rows.row_iter().map(|row| row.transpose()).collect();
+    while found.len() < k {
+        let orthogonal = |mut vector: DVector<f64>| {
+            found.iter().for_each(|other| vector -= other * other.dot(&vector));
+            vector
+        };
+        let left = (0..k).map(|i| orthogonal(DVector::from_fn(k, |j, _| f64::from(i == j))));
+        let longest = left.max_by(|a, b| a.norm().total_cmp(&b.norm())).expect("k is not 0");
+        let next = orthogonal(longest).normalize();
+        found.push(next);
+    }
+    DMatrix::from_columns(&found[rows.nrows()..])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::colorimetry::xyz_weights;
+    use crate::model::Model;
+    use crate::program::{Program, weights};
+
+    fn surfaces() -> (Model, Program, Affine) {
+        let model = Model::builtin("munsell-vrhel").unwrap();
+        let program = Program::new(&model, &weights(&model, 1.0));
+        let xyz = program.spectrum.project(&xyz_weights(model.grid()).unwrap());
+        (model, program, xyz)
+    }
+
+    #[test]
+    fn given_tristimulus_values_do_not_vary() {
+        let (_, program, xyz) = surfaces();
+        let target = [0.3, 0.4, 0.2];
+        let given = Condition::new(&xyz).unwrap().given(target, &xyz);
+        assert!(given.offset.iter().zip(target).all(|(found, wanted)| (found - wanted).abs() < 1e-14));
+        assert_eq!(given.gain.len(), program.components() - 3);
+        assert!(given.gain.iter().flatten().all(|gain| gain.abs() < 1e-15));
+    }
+
+    /// Against the textbook: mean + C A' (A C A')^-1 (xyz - a) and C - C A' (A C A')^-1 A C of the weights.
+    #[test]
+    fn mean_and_covariance_are_the_closed_form() {
+        let (model, _, xyz) = surfaces();
+        let target = [0.25, 0.3, 0.2];
+        let map = weights(&model, 1.0);
+        let given = Condition::new(&xyz).unwrap().given(target, &map);
+        let k = model.components();
+        let factor = DMatrix::from_fn(k, k, |row, column| map.gain[column][row]);
+        let a = DMatrix::from_fn(3, k, |row, column| xyz.gain[column][row]); // of z: a = A factor
+        let inverse = (&a * a.transpose()).try_inverse().unwrap();
+        let difference = DVector::from_fn(3, |i, _| target[i] - xyz.offset[i]);
+        let mean = DVector::from_column_slice(&map.offset) + &factor * a.transpose() * &inverse * difference;
+        let kept = DMatrix::identity(k, k) - a.transpose() * inverse * &a;
+        let covariance = &factor * kept * factor.transpose();
+        let gain = DMatrix::from_fn(k, k - 3, |row, column| given.gain[column][row]);
+        assert!((DVector::from_column_slice(&given.offset) - mean).amax() < 1e-12);
+        assert!((&gain * gain.transpose() - covariance).amax() < 1e-12);
+    }
+
+    #[test]
+    fn what_does_not_vary_in_four_directions_is_refused() {
+        let (_, _, xyz) = surfaces();
+        let of = |gain: Vec<Vec<f64>>| Condition::new(&Affine { offset: xyz.offset.clone(), gain });
+        assert!(of(xyz.gain[..3].to_vec()).is_none());
+        assert!(of(vec![xyz.gain[0].clone(); 6]).is_none());
+        assert!(of(vec![vec![0.0; 3]; 6]).is_none());
+    }
+}

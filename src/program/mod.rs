@@ -1,0 +1,169 @@
+//! A model under a recipe, as the numbers that one draw computes with.
+//!
+//! Everything that does not depend on the random words is folded here, in f64. A spectrum is linear in the k standard
+//! normals z of a candidate, and so is all that is linear in a spectrum: weights, tristimulus values, luminous
+//! reflectance. Each is an [`Affine`] map of z, with the weights' mean in its offset and the covariance's factor and
+//! scale in its gains. What is left of a draw is one rule that the spectrum must obey, and one factor that scales it.
+//! The shader and the CPU engine both work from this, and round it once.
+
+pub(crate) mod condition;
+pub(crate) mod feasibility;
+mod rule;
+
+pub use rule::Bounds;
+pub(crate) use rule::{IntensityLaw, LrvTarget};
+
+use crate::affine::Affine;
+use crate::cover::{BoxMixture, Cover};
+use crate::dataset::SpectrumKind;
+use crate::model::Model;
+use crate::quantity::{ArrayFormat, ValueRange};
+
+/// What a map of z is multiplied by.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Unit {
+    /// 1.
+    One,
+    /// What the spectrum is scaled by.
+    Scale,
+    /// The reciprocal of the first value of another map.
+    Over(Affine),
+}
+
+/// Where a quantity comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Source {
+    /// The spectrum, scaled.
+    Spectrum,
+    /// A map of z, and what multiplies it.
+    Map(Affine, Unit),
+    /// The intensity of the draw.
+    Intensity,
+    /// The word of the draw's [`DrawStatus`](crate::DrawStatus).
+    Status,
+}
+
+/// A quantity that comes out.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Output {
+    pub(crate) format: ArrayFormat,
+    pub(crate) source: Source,
+}
+
+/// What one draw computes. n bands, k components.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Program {
+    pub(crate) kind: SpectrumKind,
+    /// The spectrum before it is scaled, n values.
+    pub(crate) spectrum: Affine,
+    pub(crate) target: Option<LrvTarget>,
+    pub(crate) intensity: Option<IntensityLaw>,
+    /// What proposes candidates, where it is not plain rejection: z is then what it gives, and all maps are of that.
+    pub(crate) proposal: Option<BoxMixture<f64>>,
+    /// How many candidates a draw may take, at least 1 and less than 2^31.
+    pub(crate) max_attempts: u32,
+    /// What comes out, in the order of [`Quantity`](crate::Quantity), each once.
+    pub(crate) outputs: Vec<Output>,
+}
+
+impl Program {
+    /// Draws of a model with these weights that are physical, of which nothing comes out yet.
+    pub(crate) fn new(model: &Model, weights: &Affine) -> Program {
+        let parts = model.parts();
+        let columns: Vec<_> =
+            parts.basis.column_iter().map(|c| c.iter().copied().collect::<Vec<_>>()).collect();
+        let mut spectrum = weights.project(&columns);
+        spectrum.offset.iter_mut().zip(&parts.mean).for_each(|(s, mean)| *s += mean);
+        Program {
+            kind: parts.kind,
+            spectrum,
+            target: None,
+            intensity: None,
+            proposal: None,
+            max_attempts: 1,
+            outputs: Vec::new(),
+        }
+    }
+
+    /// The same with every spectrum multiplied by `intensity`.
+    pub(crate) fn brightened(self, intensity: f64) -> Program {
+        Program { spectrum: self.spectrum.scaled(intensity), ..self }
+    }
+
+    /// The same draws from the candidates of a cover.
+    pub(crate) fn covered(self, cover: &Cover) -> Program {
+        let frame = cover.frame();
+        let turned = |source| match source {
+            Source::Map(map, Unit::Over(over)) => {
+                Source::Map(frame.turned(&map), Unit::Over(frame.turned(&over)))
+            }
+            Source::Map(map, unit) => Source::Map(frame.turned(&map), unit),
+            other => other,
+        };
+        let outputs = self.outputs.into_iter().map(|o| Output { source: turned(o.source), ..o }).collect();
+        let spectrum = frame.turned(&self.spectrum);
+        Program { spectrum, outputs, proposal: Some(cover.proposal().clone()), ..self }
+    }
+
+    /// The same with tallies among what comes out.
+    pub(crate) fn with_status(&self) -> Program {
+        let format = ArrayFormat::status();
+        let mut outputs = self.outputs.clone();
+        if outputs.iter().all(|output| output.source != Source::Status) {
+            outputs.push(Output { format, source: Source::Status });
+            outputs.sort_by_key(|output| output.format.quantity);
+        }
+        Program { outputs, ..self.clone() }
+    }
+
+    /// The same with nothing but spectra coming out.
+    pub(crate) fn spectra_alone(&self) -> Program {
+        let format = ArrayFormat::spectra(self.bands());
+        Program { outputs: vec![Output { format, source: Source::Spectrum }], ..self.clone() }
+    }
+
+    pub(crate) fn bands(&self) -> usize {
+        self.spectrum.offset.len()
+    }
+
+    pub(crate) fn components(&self) -> usize {
+        self.spectrum.gain.len()
+    }
+
+    /// Whether spectra are scaled, by a target or an intensity.
+    pub(crate) fn scales(&self) -> bool {
+        self.target.is_some() || self.intensity.is_some()
+    }
+
+    /// What the values of spectra that come out are between.
+    pub(crate) fn interval(&self) -> ValueRange {
+        match self.kind {
+            SpectrumKind::Reflectance if !self.may_exceed_one() => ValueRange::Unit,
+            _ => ValueRange::Positive,
+        }
+    }
+
+    /// Whether the spectrum before scaling must be below 1.
+    pub(crate) fn tests_base(&self) -> bool {
+        self.target.as_ref().is_none_or(|t| t.bounds != Bounds::Scaled)
+    }
+
+    /// Whether the spectrum after scaling must be below 1.
+    pub(crate) fn tests_scaled(&self) -> bool {
+        self.target.as_ref().is_some_and(|t| t.bounds != Bounds::Base)
+    }
+
+    /// Whether scaling may take an accepted spectrum to 1 or above.
+    pub(crate) fn may_exceed_one(&self) -> bool {
+        self.target.as_ref().is_some_and(|t| t.bounds == Bounds::Base)
+    }
+}
+
+/// The weights of a model as a map of z.
+pub(crate) fn weights(model: &Model, covariance_scale: f64) -> Affine {
+    let factor = model.weight_factor() * covariance_scale.sqrt();
+    Affine {
+        offset: model.parts().weight_mean.as_slice().to_vec(),
+        gain: factor.column_iter().map(|column| column.iter().copied().collect()).collect(),
+    }
+}

@@ -1,0 +1,56 @@
+//! The rule that a spectrum must meet, and the factor that scales it.
+
+use std::collections::HashMap;
+use std::iter;
+
+use crate::affine::Affine;
+
+/// What must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Bounds {
+    /// The spectrum before scaling, as in the appendix. Scaled values can then exceed 1; draws that do are counted.
+    #[default]
+    Base,
+    /// The spectrum after scaling, as in the authors' published code.
+    Scaled,
+    /// Both.
+    Both,
+}
+
+/// A target luminous reflectance.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct LrvTarget {
+    /// The luminous reflectance value (LRV) of every draw, in (0, 1).
+    pub(crate) lrv: f64,
+    /// The weights of the bands in a reflectance's LRV; they sum to 1. Draws are scaled by sums over their bands as
+    /// they were rounded, so that it is the spectrum that comes out which has the target; a map of z would be off
+    /// where a candidate is dark.
+    pub(crate) weights: Vec<f64>,
+    pub(crate) bounds: Bounds,
+}
+
+impl LrvTarget {
+    /// The same for these spectra, with the weights of bands that are alike on the first of them. A driver may take
+    /// v s + w s for (v + w) s, which rounds otherwise.
+    pub(crate) fn of_unlike_bands(mut self, spectrum: &Affine) -> LrvTarget {
+        let mut first = HashMap::new();
+        for (band, offset) in spectrum.offset.iter().enumerate() {
+            let numbers = iter::once(offset).chain(spectrum.gain.iter().map(|gain| &gain[band]));
+            let rounded: Vec<u32> = numbers.map(|&number| (number as f32).to_bits()).collect();
+            let like = *first.entry(rounded).or_insert(band);
+            if like < band {
+                self.weights[like] += std::mem::take(&mut self.weights[band]);
+            }
+        }
+        self
+    }
+}
+
+/// An intensity that differs from draw to draw: a function of one uniform word of the draw.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum IntensityLaw<R = f64> {
+    /// Uniform in its logarithm: low x 2^(u octaves).
+    LogUniform { low: R, octaves: R },
+    /// One of these, each as likely.
+    OneOf(Vec<R>),
+}

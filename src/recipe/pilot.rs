@@ -1,0 +1,28 @@
+//! A pilot run, which estimates before any work starts how many candidates are accepted.
+
+use rayon::prelude::*;
+
+use crate::cpu::Kernel;
+use crate::program::Program;
+use crate::random::stream::Stream;
+
+/// How many candidates estimate the acceptance before any work starts.
+pub(super) const PILOT: u64 = 1 << 16;
+
+/// The probability that a draw finds no candidate within its attempts, above which a recipe is refused: one failure
+/// in a data set of 10^12 draws.
+pub(super) const TOLERABLE_FAILURE: f64 = 1e-12;
+
+/// The share of accepted candidates, of a stream of its own. In f32, as draws are made: what passes in f64 may have no
+/// room there.
+pub(super) fn pilot(program: &Program) -> f64 {
+    let kernel = Kernel::<f32>::new(program);
+    let stream = Stream::named(0, "pilot");
+    let accepted = (0..PILOT).into_par_iter().filter(|&index| kernel.accepts(|b| stream.block(index, 0, b)));
+    accepted.count() as f64 / PILOT as f64
+}
+
+/// The probability that none of `attempts` candidates is accepted.
+pub(super) fn failure(acceptance: f64, attempts: u32) -> f64 {
+    (f64::from(attempts) * (-acceptance).ln_1p()).exp()
+}

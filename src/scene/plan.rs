@@ -1,0 +1,262 @@
+//! What is drawn for a group, and where: a [`Group`] that was found to be possible.
+
+use serde::Serialize;
+
+use crate::dataset::SpectrumKind;
+use crate::grid::Grid;
+use crate::model::{Model, ModelParts};
+use crate::program::{Bounds, IntensityLaw};
+use crate::quantity::{Quantity, ValueRange};
+use crate::random::stream::{self, Stream};
+use crate::recipe::{Intensity, Recipe, RecipeBuilder, RecipeError};
+
+use super::error::{Fault, SceneErrorKind};
+use super::group::{Base, Group, Illuminants, IntensityScope, TargetConstraint, Targets};
+use super::target::{TargetPlan, key};
+
+/// A group as it is drawn.
+pub(super) struct GroupPlan {
+    pub(super) name: String,
+    pub(super) kind: GroupKind,
+    /// What its spectra are drawn from; flat ones are not.
+    pub(super) model: Option<Model>,
+    /// How many a scene has.
+    pub(super) count: u32,
+    /// In rows of that.
+    pub(super) stream: Stream,
+    pub(super) max_attempts: u32,
+    pub(super) shapes: Shapes,
+    pub(super) intensity: Option<Varying>,
+    pub(super) arrays: Vec<Array>,
+}
+
+/// What the spectra of a group are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GroupKind {
+    /// Lights.
+    Illuminant,
+    /// Reflectances.
+    Surface,
+    /// Reflectances that have something given.
+    Target,
+}
+
+/// Where the spectra of a group come from, before intensities.
+pub(super) enum Shapes {
+    /// From the engine, for each scene.
+    Engine(Box<Drawing>),
+    /// From the CPU, once for all scenes: for so few no shader is worth compiling.
+    Once(Box<Drawing>),
+    /// From the CPU, for each scene.
+    Target(Box<TargetPlan>),
+}
+
+/// Draws of a recipe: `places` a scene, one for each of its elements or one for all.
+pub(super) struct Drawing {
+    pub(super) recipe: Recipe,
+    pub(super) places: u32,
+}
+
+/// An intensity that varies.
+pub(super) struct Varying {
+    law: IntensityLaw<f32>,
+    pub(super) scope: IntensityScope,
+}
+
+/// An array that a scene gives.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Array {
+    /// Its name: that of its group, with an underscore and the name of the quantity unless that is spectra.
+    pub name: String,
+    /// The group that it belongs to.
+    #[serde(skip)]
+    pub group: String,
+    /// The quantity that it holds: f32, or u32 where it counts attempts.
+    pub quantity: Quantity,
+    /// Whether it has an entry for each scene, rather than one for all.
+    pub per_scene: bool,
+    /// The extents of an entry. Spectra have (count, bands), and other quantities one of them or none.
+    pub shape: Vec<usize>,
+    /// What its values are between, if they are spectra.
+    #[serde(skip)]
+    pub interval: Option<ValueRange>,
+}
+
+/// The name of a group's array: that of the group, with an underscore and the name of the quantity unless that is
+/// spectra.
+fn array_name(group: &str, quantity: Quantity) -> String {
+    match quantity {
+        Quantity::Spectra => group.to_owned(),
+        quantity => format!("{group}_{quantity}"),
+    }
+}
+
+impl Array {
+    /// How many values an entry has.
+    pub fn values(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// How many bytes an entry has: every value has 4.
+    pub fn bytes(&self) -> usize {
+        4 * self.values()
+    }
+}
+
+impl Varying {
+    /// The intensity of an element of a scene; `stream` is in rows of as many as the scene has.
+    pub(super) fn at(&self, stream: Stream, scene: u64, element: u32) -> f32 {
+        // The first place of a row is the same in rows of any length.
+        let (stream, index) = match self.scope {
+            IntensityScope::Scene => (stream.in_rows(1), scene),
+            IntensityScope::Light => (stream, scene * u64::from(stream.row()) + u64::from(element)),
+        };
+        self.law.of(stream.block(index, 0, stream::DRAW_BLOCK)[0])
+    }
+}
+
+impl GroupPlan {
+    /// Finds out how to draw group `number` of a scene.
+    pub(super) fn new(number: usize, group: &Group, grid: Grid, seed: u64) -> Result<GroupPlan, Fault> {
+        let base = group.base();
+        let fault = |key, problem| Fault::of_group(number, key, problem);
+        let count = u32::try_from(base.count).expect("the count was checked");
+        let stream = Stream::named(seed, &base.name).in_rows(count);
+        if let Some(model) = &base.model
+            && model.grid() != grid
+        {
+            return Err(fault("model", SceneErrorKind::Grid { model: model.grid(), scene: grid }));
+        }
+        let (kind, shapes, intensity) = match group {
+            Group::Illuminants(group) => {
+                let (drawing, intensity) = illuminants(group).map_err(|(k, p)| fault(k, p))?;
+                let shapes = if group.fixed { Shapes::Once(drawing) } else { Shapes::Engine(drawing) };
+                (GroupKind::Illuminant, shapes, intensity)
+            }
+            Group::Surfaces(group) => {
+                let model = of_kind(base, SpectrumKind::Reflectance).map_err(|(k, p)| fault(k, p))?;
+                let recipe =
+                    recipe(base, model).build().map_err(|e| fault(key(&e), SceneErrorKind::Recipe(e)))?;
+                let drawing = Box::new(Drawing { recipe, places: count });
+                let shapes = if group.fixed { Shapes::Once(drawing) } else { Shapes::Engine(drawing) };
+                (GroupKind::Surface, shapes, None)
+            }
+            Group::Targets(group) => {
+                let target = TargetPlan::new(group, grid.len(), stream).map_err(|(k, p)| fault(k, p))?;
+                (GroupKind::Target, Shapes::Target(Box::new(target)), None)
+            }
+        };
+        let arrays = arrays(group, &shapes, intensity.as_ref(), grid.len());
+        let model = match &shapes {
+            Shapes::Engine(drawing) | Shapes::Once(drawing) => Some(drawing.recipe.model().clone()),
+            Shapes::Target(_) => base.model.clone(),
+        };
+        let (name, max_attempts) = (base.name.clone(), base.max_attempts);
+        Ok(GroupPlan { name, kind, model, count, stream, max_attempts, shapes, intensity, arrays })
+    }
+
+    /// What the engine draws, where it does.
+    pub(super) fn drawn_by_engine(&self) -> Option<&Drawing> {
+        match &self.shapes {
+            Shapes::Engine(drawing) => Some(drawing),
+            _ => None,
+        }
+    }
+}
+
+fn recipe(base: &Base, model: &Model) -> RecipeBuilder {
+    Recipe::builder(model).covariance_scale(base.covariance_scale).max_attempts(base.max_attempts)
+}
+
+fn of_kind(base: &Base, wanted: SpectrumKind) -> Result<&Model, (&'static str, SceneErrorKind)> {
+    let model = base.model.as_ref().expect("only flat targets have none");
+    match model.kind() {
+        found if found == wanted => Ok(model),
+        found => Err(("model", SceneErrorKind::SpectrumKind { found, wanted })),
+    }
+}
+
+type Lights = (Box<Drawing>, Option<Varying>);
+
+fn illuminants(group: &Illuminants) -> Result<Lights, (&'static str, SceneErrorKind)> {
+    let model = of_kind(&group.base, SpectrumKind::Illuminant)?;
+    let model = match &group.mean {
+        Some(mean) => with_mean(model, mean).map_err(|problem| ("mean", problem))?,
+        None => model.clone(),
+    };
+    let failed = |e: RecipeError| (key(&e), SceneErrorKind::Recipe(e));
+    let mut recipe = recipe(&group.base, &model);
+    let mut varying = None;
+    match group.intensity {
+        None => {}
+        // The same for all: the recipe has it for nothing.
+        Some((intensity @ Intensity::Fixed(_), _)) => recipe = recipe.intensity(intensity),
+        Some((intensity, scope)) => {
+            let checked = recipe.clone().intensity(intensity).build().map_err(failed)?;
+            let law = checked.program().intensity.as_ref().expect("the intensity varies");
+            varying = Some(Varying { law: law.rounded(), scope });
+        }
+    }
+    let places = if group.same_shape { 1 } else { group.base.count as u32 };
+    let recipe = recipe.build().map_err(failed)?;
+    Ok((Box::new(Drawing { recipe, places }), varying))
+}
+
+/// The model with another mean spectrum, of the same mean power.
+fn with_mean(model: &Model, mean: &[f64]) -> Result<Model, SceneErrorKind> {
+    let parts = model.parts();
+    if mean.len() != model.bands() {
+        return Err(SceneErrorKind::MeanLength { found: mean.len(), expected: model.bands() });
+    }
+    let power = mean.iter().sum::<f64>() / mean.len() as f64;
+    if !(power > 0.0 && power.is_finite()) {
+        return Err(SceneErrorKind::DarkMean(power));
+    }
+    // The mean of the draws is that of the model and what the mean weights add to it.
+    let old = model.reconstruct(parts.weight_mean.as_slice());
+    let scale = old.mean() / power;
+    let mut new = parts.mean.clone();
+    new.iter_mut().zip(mean).zip(&old).for_each(|((new, mean), old)| *new += scale * mean - old);
+    Model::new(ModelParts { mean: new, ..parts.clone() }).map_err(SceneErrorKind::Model)
+}
+
+fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: usize) -> Vec<Array> {
+    let base = group.base();
+    let count = base.count as usize;
+    let once = matches!(shapes, Shapes::Once(_));
+    let interval = match group {
+        Group::Illuminants(_) => ValueRange::Positive,
+        Group::Surfaces(_) => ValueRange::Unit,
+        Group::Targets(Targets { aim: TargetConstraint::Lrv(_), bounds: Bounds::Base, .. }) => {
+            ValueRange::Positive
+        }
+        Group::Targets(_) => ValueRange::Unit,
+    };
+    let array = |quantity: Quantity, per_scene, shape: &[usize]| Array {
+        name: array_name(&base.name, quantity),
+        group: base.name.clone(),
+        quantity,
+        per_scene,
+        shape: shape.to_vec(),
+        interval: (quantity == Quantity::Spectra).then_some(interval),
+    };
+    let mut arrays = vec![array(Quantity::Spectra, !once || intensity.is_some(), &[count, bands])];
+    match intensity.map(|intensity| intensity.scope) {
+        Some(IntensityScope::Scene) => arrays.push(array(Quantity::Intensity, true, &[])),
+        Some(IntensityScope::Light) => arrays.push(array(Quantity::Intensity, true, &[count])),
+        None => {}
+    }
+    let mut flat = false;
+    if let Group::Targets(Targets { aim, .. }) = group {
+        arrays.push(array(Quantity::Lrv, true, &[count]));
+        if let TargetConstraint::Hue(_) = aim {
+            arrays.push(array(Quantity::Xyz, true, &[count, 3]));
+        }
+        flat = matches!(aim, TargetConstraint::Flat(_));
+    }
+    if !flat {
+        arrays.push(array(Quantity::Attempts, !once, &[count]));
+    }
+    arrays
+}

@@ -1,0 +1,258 @@
+//! Scenes in a host's encoder: a buffer a group, recorded and not submitted.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+use wgpu::{BufferUsages, Device};
+
+use crate::engine::{DrawSummary, EngineError};
+use crate::quantity::Quantity;
+use crate::sampler::{Prepared, Sampler, SamplerError};
+
+use super::Scene;
+use super::group::IntensityScope;
+use super::plan::{Array, Drawing, GroupPlan};
+use super::session::{SharedSpectra, columns};
+
+const COPIES: &str = include_str!("../../shaders/scene_copies.wgsl");
+
+/// A scene's pipelines on a wgpu device.
+///
+/// A guest as [`Sampler`] is: it never submits, polls or asks for a device of its own. `examples/scene.rs` has it in
+/// a renderer.
+pub struct SceneSampler<'a> {
+    scene: &'a Scene,
+    /// Those of the groups that the device draws.
+    samplers: Vec<Option<Sampler>>,
+    /// What multiplies and copies spectra, where some are.
+    copies: Option<wgpu::ComputePipeline>,
+    once: Vec<Option<SharedSpectra>>,
+}
+
+/// Scenes, ready to be recorded, any number of times.
+pub struct PreparedScene<'a> {
+    groups: Vec<Group<'a>>,
+    copies: Option<wgpu::ComputePipeline>,
+}
+
+/// A group of some scenes.
+struct Group<'a> {
+    plan: &'a GroupPlan,
+    drawn: Option<Prepared>,
+    copied: Option<Copied>,
+    /// The spectra, where they are not those that are drawn.
+    spectra: Option<wgpu::Buffer>,
+    /// What else is known of it: luminous reflectances, intensities.
+    values: Vec<(&'a Array, Vec<f32>)>,
+}
+
+/// A pass that copies shapes and multiplies them.
+struct Copied {
+    bindings: wgpu::BindGroup,
+    values: u32,
+}
+
+/// What the shader of copies reads as `Sizes`.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Sizes {
+    values: u32,
+    bands: u32,
+    copies: u32,
+    lights: u32,
+}
+
+impl<'a> SceneSampler<'a> {
+    /// Compiles what the groups need that are drawn for each scene, and draws what serves all scenes.
+    pub fn new(device: &Device, scene: &'a Scene) -> Result<SceneSampler<'a>, EngineError> {
+        let mut samplers: Vec<Option<Sampler>> = Vec::new();
+        for (i, plan) in scene.plans.iter().enumerate() {
+            let Some(drawing) = plan.drawn_by_engine() else {
+                samplers.push(None);
+                continue;
+            };
+            let same = |other: &GroupPlan| {
+                other.drawn_by_engine().is_some_and(|d| d.recipe.program() == drawing.recipe.program())
+            };
+            samplers.push(Some(match scene.plans[..i].iter().position(same) {
+                Some(other) => samplers[other].clone().expect("the device draws it"),
+                None => Sampler::new(device, &drawing.recipe)?,
+            }));
+        }
+        let copies = scene.plans.iter().any(copies).then(|| pipeline(device));
+        Ok(SceneSampler { scene, samplers, copies, once: scene.once()? })
+    }
+
+    /// Buffers for some scenes, and all that records them.
+    pub fn prepare(&self, device: &Device, scenes: Range<u64>) -> Result<PreparedScene<'a>, EngineError>
+    where
+        Self: 'a,
+    {
+        let plans = self.scene.plans.iter().zip(&self.samplers).zip(&self.once);
+        let groups = plans.map(|((plan, sampler), once)| match (plan.drawn_by_engine(), sampler) {
+            (Some(drawing), Some(sampler)) => self.drawn(device, plan, (drawing, sampler), scenes.clone()),
+            _ => made(device, plan, once.as_ref(), scenes.clone()),
+        });
+        Ok(PreparedScene { groups: groups.collect::<Result<_, _>>()?, copies: self.copies.clone() })
+    }
+
+    /// A group that the device draws.
+    fn drawn(
+        &self,
+        device: &Device,
+        plan: &'a GroupPlan,
+        (drawing, sampler): (&Drawing, &Sampler),
+        scenes: Range<u64>,
+    ) -> Result<Group<'a>, EngineError> {
+        let places = u64::from(drawing.places);
+        let stream = plan.stream.in_rows(drawing.places);
+        let drawn = sampler.prepare(device, stream.draws(scenes.start * places..scenes.end * places))?;
+        let Some(pipeline) = self.copies.as_ref().filter(|_| copies(plan)) else {
+            return Ok(Group { plan, drawn: Some(drawn), copied: None, spectra: None, values: Vec::new() });
+        };
+        let bands = self.scene.grid.len();
+        let elements = (scenes.end - scenes.start) * u64::from(plan.count);
+        let bytes = check(device, elements, bands)?;
+        let (intensities, lights) = intensities(plan, scenes);
+        let spectra = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(&format!("spectroll {}", plan.name)),
+            size: bytes.max(4),
+            usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let sizes = Sizes {
+            values: (elements * bands as u64) as u32, // `check` keeps it below 2^32
+            bands: bands as u32,
+            copies: plan.count / drawing.places,
+            lights: lights.unwrap_or(elements.max(1) as u32),
+        };
+        let uniform = filled(device, "spectroll sizes", BufferUsages::UNIFORM, bytemuck::bytes_of(&sizes));
+        let factors = bytemuck::cast_slice(&intensities);
+        let factors = filled(device, "spectroll intensities", BufferUsages::STORAGE, factors);
+        let shapes = drawn.buffer(Quantity::Spectra).expect("the recipe asks for them");
+        let buffers = [&uniform, shapes, &factors, &spectra];
+        let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("spectroll copies"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[0, 1, 2, 3].map(|binding| wgpu::BindGroupEntry {
+                binding,
+                resource: buffers[binding as usize].as_entire_binding(),
+            }),
+        });
+        let values = plan.arrays.iter().find(|array| array.name == format!("{}_intensity", plan.name));
+        Ok(Group {
+            plan,
+            copied: Some(Copied { bindings, values: sizes.values }),
+            drawn: Some(drawn),
+            spectra: Some(spectra),
+            values: values.map(|array| (array, intensities)).into_iter().collect(),
+        })
+    }
+}
+
+impl PreparedScene<'_> {
+    /// Records compute passes that fill the buffers of the groups that the device draws; the others are full.
+    pub fn record(&self, encoder: &mut wgpu::CommandEncoder) {
+        for group in &self.groups {
+            if let Some(drawn) = &group.drawn {
+                drawn.record(encoder);
+            }
+            let (Some(copied), Some(pipeline)) = (&group.copied, &self.copies) else { continue };
+            let descriptor =
+                wgpu::ComputePassDescriptor { label: Some("spectroll copies"), timestamp_writes: None };
+            let mut pass = encoder.begin_compute_pass(&descriptor);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &copied.bindings, &[]);
+            let workgroups = copied.values.div_ceil(64);
+            let rows = workgroups.div_ceil(65_535).max(1);
+            pass.dispatch_workgroups(workgroups.div_ceil(rows), rows, 1);
+        }
+    }
+
+    /// The spectra of a group once the passes have run, as f32 by scene, element and band; of one that is fixed, and
+    /// has no intensity that varies, by element and band. The buffer may be longer. `None` where there is no such
+    /// group.
+    pub fn buffer(&self, group: &str) -> Option<&wgpu::Buffer> {
+        let group = self.groups.iter().find(|other| other.plan.name == group)?;
+        let drawn = || group.drawn.as_ref()?.buffer(Quantity::Spectra);
+        group.spectra.as_ref().or_else(drawn)
+    }
+
+    /// The values of another array of f32, such as `target_lrv` or `lights_intensity`, which are known already.
+    pub fn values(&self, name: &str) -> Option<&[f32]> {
+        let mut values = self.groups.iter().flat_map(|group| &group.values);
+        values.find(|(array, _)| array.name == name).map(|(_, values)| values.as_slice())
+    }
+}
+
+/// A group that the CPU makes.
+fn made<'a>(
+    device: &Device,
+    plan: &'a GroupPlan,
+    once: Option<&SharedSpectra>,
+    scenes: Range<u64>,
+) -> Result<Group<'a>, EngineError> {
+    let columns = columns(plan, once, None, scenes, &mut DrawSummary::default())?;
+    let spectra = match once {
+        Some(once) if plan.intensity.is_none() => &once.spectra,
+        _ => &*columns.spectra,
+    };
+    let bands = plan.arrays[0].shape[1];
+    check(device, (spectra.len() / bands) as u64, bands)?;
+    let label = format!("spectroll {}", plan.name);
+    let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+    let buffer = filled(device, &label, usage, bytemuck::cast_slice(spectra));
+    let values = columns.known(plan);
+    Ok(Group { plan, drawn: None, copied: None, spectra: Some(buffer), values })
+}
+
+/// Whether spectra are drawn that are not yet those of the group.
+fn copies(plan: &GroupPlan) -> bool {
+    plan.drawn_by_engine().is_some_and(|drawing| drawing.places < plan.count || plan.intensity.is_some())
+}
+
+/// The intensities of some scenes, and how many elements in a row have one: all, unless there are any.
+fn intensities(plan: &GroupPlan, scenes: Range<u64>) -> (Vec<f32>, Option<u32>) {
+    let Some(intensity) = &plan.intensity else { return (vec![1.0], None) };
+    let lights = if intensity.scope == IntensityScope::Scene { plan.count } else { 1 };
+    let elements = scenes.flat_map(|scene| (0..plan.count / lights).map(move |element| (scene, element)));
+    (elements.map(|(scene, element)| intensity.at(plan.stream, scene, element)).collect(), Some(lights))
+}
+
+/// The bytes of so many spectra, if a buffer of the device holds them.
+fn check(device: &Device, spectra: u64, bands: usize) -> Result<u64, EngineError> {
+    let limits = device.limits();
+    let row = 4 * bands as u64;
+    let (largest, limit) = [
+        (limits.max_storage_buffer_binding_size / row, "max_storage_buffer_binding_size"),
+        (limits.max_buffer_size / row, "max_buffer_size"),
+        (u64::from(u32::MAX) / row, "32-bit offsets"),
+    ]
+    .into_iter()
+    .min()
+    .expect("there are limits");
+    match spectra > largest {
+        true => Err(SamplerError::TooMany { count: spectra, largest, limit }.into()),
+        false => Ok(spectra * row),
+    }
+}
+
+fn pipeline(device: &Device) -> wgpu::ComputePipeline {
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("spectroll copies"),
+        source: wgpu::ShaderSource::Wgsl(COPIES.into()),
+    });
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some("spectroll copies"),
+        layout: None,
+        module: &module,
+        entry_point: Some("main"),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    })
+}
+
+/// A buffer of these bytes; of four zeros where there are none, since a binding is not empty.
+fn filled(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
+    crate::sampler::filled_buffer(device, label, usage, if bytes.is_empty() { &[0; 4] } else { bytes })
+}

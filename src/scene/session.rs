@@ -1,0 +1,324 @@
+//! Scenes from an engine, window by window.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::cpu::Kernel;
+use crate::draw_status::DrawStatus;
+use crate::engine::{Batch, DrawSummary, Engine, EngineError, Job, Schedule};
+use crate::quantity::Quantity;
+use crate::random::stream::DrawRange;
+
+use super::Scene;
+use super::group::IntensityScope;
+use super::plan::{Array, Drawing, GroupPlan, Shapes};
+
+/// About how many bytes a window has where no engine draws it.
+const WINDOW_BYTES: u64 = 8 << 20;
+
+/// Some scenes, with every array that differs between scenes.
+#[derive(Debug)]
+pub struct Window<'a> {
+    /// Which scenes these are.
+    pub scenes: Range<u64>,
+    arrays: Vec<(&'a Array, Cow<'a, [u8]>)>,
+}
+
+/// An engine with a scene. See [`Scene::session`].
+pub struct SceneSession<'a> {
+    scene: &'a Scene,
+    /// For the groups that the engine draws, where there are any.
+    schedule: Option<Schedule<'a>>,
+    /// What was drawn once, of each group.
+    once: Vec<Option<SharedSpectra>>,
+}
+
+/// What a group took.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct GroupSummary {
+    /// The group.
+    pub group: String,
+    /// What its draws took.
+    #[serde(flatten)]
+    pub summary: DrawSummary,
+}
+
+/// Spectra and tallies that serve all scenes, one for each element.
+pub(super) struct SharedSpectra {
+    pub(super) spectra: Vec<f32>,
+    pub(super) statuses: Vec<DrawStatus>,
+}
+
+/// The arrays of a group in a window, as they come: some are those of the engine.
+#[derive(Default)]
+pub(super) struct Columns<'a> {
+    pub(super) spectra: Cow<'a, [f32]>,
+    attempts: Cow<'a, [u32]>,
+    intensity: Vec<f32>,
+    lrv: Vec<f32>,
+    xyz: Vec<f32>,
+}
+
+impl<'a> Window<'a> {
+    /// The arrays, group by group, as they are in memory: 4 bytes a value in this machine's order, scene by scene.
+    pub fn arrays(&self) -> impl Iterator<Item = (&'a Array, &[u8])> {
+        self.arrays.iter().map(|(array, bytes)| (*array, &**bytes))
+    }
+
+    /// The bytes of an array by its name; none where it does not differ between scenes, or is none.
+    pub fn bytes(&self, name: &str) -> &[u8] {
+        self.arrays.iter().find(|(array, _)| array.name == name).map_or(&[], |(_, bytes)| bytes)
+    }
+
+    /// The values of an array of f32.
+    ///
+    /// # Panics
+    /// Where they are attempts, which are u32.
+    pub fn values(&self, name: &str) -> &[f32] {
+        let counts = |(array, _): &&(&Array, _)| array.name == name && array.quantity == Quantity::Attempts;
+        assert!(!self.arrays.iter().any(|array| counts(&array)), "{name} are integers");
+        bytemuck::cast_slice(self.bytes(name))
+    }
+}
+
+impl Scene {
+    /// Gets ready to draw: compiles what the engine needs for the groups that it draws, and draws what serves all
+    /// scenes.
+    pub fn session<'a>(&'a self, engine: &'a Engine) -> Result<SceneSession<'a>, EngineError> {
+        let drawings = self.plans.iter().filter_map(GroupPlan::drawn_by_engine);
+        let members: Vec<_> = drawings
+            .map(|drawing| Job { recipe: &drawing.recipe, per_step: drawing.places.into() })
+            .collect();
+        let schedule = (!members.is_empty()).then(|| engine.schedule(&members)).transpose()?;
+        Ok(SceneSession { scene: self, schedule, once: self.once()? })
+    }
+
+    /// What serves all scenes, of each group.
+    pub(super) fn once(&self) -> Result<Vec<Option<SharedSpectra>>, EngineError> {
+        let once = |plan: &GroupPlan| match &plan.shapes {
+            Shapes::Once(drawing) => SharedSpectra::new(plan, drawing).map(Some),
+            _ => Ok(None),
+        };
+        self.plans.iter().map(once).collect()
+    }
+}
+
+impl SharedSpectra {
+    fn new(plan: &GroupPlan, drawing: &Drawing) -> Result<SharedSpectra, EngineError> {
+        let kernel = Kernel::<f32>::new(&drawing.recipe.program().spectra_alone());
+        let stream = plan.stream.in_rows(drawing.places);
+        let drawn = (0..u64::from(drawing.places)).into_par_iter().map(|place| kernel.draw(stream, place));
+        let (values, statuses): (Vec<_>, Vec<_>) = drawn.unzip();
+        check(plan, drawing.places, 0, &statuses)?;
+        let mut spectra = values.into_iter().flatten().flatten().collect::<Vec<f32>>();
+        let mut statuses = statuses;
+        if drawing.places < plan.count {
+            spectra = spectra.repeat(plan.count as usize);
+            statuses = statuses.repeat(plan.count as usize);
+        }
+        Ok(SharedSpectra { spectra, statuses })
+    }
+
+    fn attempts(&self) -> Vec<u32> {
+        self.statuses.iter().map(|status| status.attempts()).collect()
+    }
+}
+
+impl SceneSession<'_> {
+    /// The arrays that serve all scenes, as they are in memory.
+    pub fn constants(&self) -> Vec<(&Array, Vec<u8>)> {
+        let mut constants = Vec::new();
+        for (plan, once) in self.scene.plans.iter().zip(&self.once) {
+            let Some(once) = once else { continue };
+            for array in plan.arrays.iter().filter(|array| !array.per_scene) {
+                let bytes = match array.quantity {
+                    Quantity::Attempts => bytemuck::cast_slice(&once.attempts()).to_vec(),
+                    _ => bytemuck::cast_slice(&once.spectra).to_vec(),
+                };
+                constants.push((array, bytes));
+            }
+        }
+        constants
+    }
+
+    /// What the draws took that serve all scenes, of each group.
+    pub fn taken_once(&self) -> Vec<GroupSummary> {
+        let summary = |(plan, once): (&GroupPlan, &Option<SharedSpectra>)| {
+            let mut summary = DrawSummary::default();
+            if let (Some(once), Shapes::Once(drawing)) = (once, &plan.shapes) {
+                summary.count(&once.statuses[..drawing.places as usize]);
+            }
+            GroupSummary { group: plan.name.clone(), summary }
+        };
+        self.scene.plans.iter().zip(&self.once).map(summary).collect()
+    }
+
+    /// Draws some scenes and hands them to `sink` in order, window by window. The first error ends it. Returns what that
+    /// took, besides [`SceneSession::taken_once`].
+    pub fn draw<E: From<EngineError>>(
+        &mut self,
+        scenes: Range<u64>,
+        mut sink: impl FnMut(Window) -> Result<(), E>,
+    ) -> Result<Vec<GroupSummary>, E> {
+        let (scene, once) = (self.scene, &self.once);
+        let none = |plan: &GroupPlan| GroupSummary { group: plan.name.clone(), ..GroupSummary::default() };
+        let mut summaries: Vec<_> = scene.plans.iter().map(none).collect();
+        let mut next = scenes.start;
+        let mut window = |batches: &[Batch], count: u64| {
+            let part = next..next + count;
+            next = part.end;
+            let mut batches = batches.iter();
+            let mut arrays = Vec::new();
+            for ((plan, once), summary) in scene.plans.iter().zip(once).zip(&mut summaries) {
+                let drawing = plan.drawn_by_engine();
+                let batch = drawing.and_then(|drawing| batches.next().map(|batch| (drawing, batch)));
+                let columns = columns(plan, once.as_ref(), batch, part.clone(), &mut summary.summary)?;
+                arrays.extend(columns.arrays(plan));
+            }
+            sink(Window { scenes: part, arrays })
+        };
+        match &mut self.schedule {
+            Some(schedule) => {
+                let drawings = || scene.plans.iter().filter_map(|plan| Some((plan, plan.drawn_by_engine()?)));
+                let draws: Vec<_> = drawings()
+                    .map(|(plan, drawing)| DrawRange {
+                        stream: plan.stream.in_rows(drawing.places),
+                        first: scenes.start * u64::from(drawing.places),
+                        count: (scenes.end - scenes.start) * u64::from(drawing.places),
+                    })
+                    .collect();
+                let places = drawings().next().map_or(1, |(_, drawing)| u64::from(drawing.places));
+                schedule.draw(&draws, scenes.end - scenes.start, |batches| {
+                    window(batches, batches[0].draws.count / places)
+                })?;
+            }
+            None => {
+                let bytes: u64 = scene.arrays().filter(|a| a.per_scene).map(|a| a.bytes() as u64).sum();
+                let most = (WINDOW_BYTES / bytes.max(1)).max(1);
+                let mut start = scenes.start;
+                while start < scenes.end {
+                    let count = most.min(scenes.end - start);
+                    window(&[], count)?;
+                    start += count;
+                }
+            }
+        }
+        Ok(summaries)
+    }
+}
+
+/// The columns of a group in some scenes.
+pub(super) fn columns<'a>(
+    plan: &'a GroupPlan,
+    once: Option<&'a SharedSpectra>,
+    batch: Option<(&Drawing, &Batch<'a>)>,
+    scenes: Range<u64>,
+    summary: &mut DrawSummary,
+) -> Result<Columns<'a>, EngineError> {
+    let count = (scenes.end - scenes.start) as usize;
+    let mut columns = match (&plan.shapes, once, batch) {
+        (_, _, Some((drawing, batch))) => {
+            check(plan, drawing.places, scenes.start, batch.statuses())?;
+            summary.count(batch.statuses());
+            // These tallies are attempts and nothing else: nothing was scaled.
+            let attempts: &[u32] = bytemuck::cast_slice(batch.bytes(Quantity::Attempts));
+            let (spectra, attempts) = (batch.values(Quantity::Spectra), attempts);
+            if drawing.places == plan.count {
+                Columns { spectra: spectra.into(), attempts: attempts.into(), ..Columns::default() }
+            } else {
+                let (bands, copies) = (spectra.len() / count, plan.count as usize);
+                let spectra = spectra.chunks_exact(bands).flat_map(|s| s.repeat(copies)).collect::<Vec<_>>();
+                let attempts = attempts.iter().flat_map(|&a| vec![a; copies]).collect::<Vec<_>>();
+                Columns { spectra: spectra.into(), attempts: attempts.into(), ..Columns::default() }
+            }
+        }
+        (_, Some(once), _) => match plan.intensity {
+            Some(_) => Columns { spectra: once.spectra.repeat(count).into(), ..Columns::default() },
+            None => Columns::default(),
+        },
+        (Shapes::Target(target), ..) => {
+            let elements = (scenes.start..scenes.end).into_par_iter();
+            let elements = elements.flat_map_iter(|scene| (0..plan.count).map(move |e| (scene, e)));
+            let drawn: Vec<_> =
+                elements.map(|(scene, element)| target.draw(plan.stream, scene, element)).collect();
+            let statuses: Vec<DrawStatus> = drawn.iter().filter_map(|drawn| drawn.status).collect();
+            check(plan, plan.count, scenes.start, &statuses)?;
+            summary.count(&statuses);
+            Columns {
+                lrv: drawn.iter().map(|drawn| drawn.lrv).collect(),
+                xyz: drawn.iter().filter_map(|drawn| drawn.xyz).flatten().collect(),
+                attempts: statuses.iter().map(|status| status.attempts()).collect(),
+                spectra: drawn.into_iter().flat_map(|drawn| drawn.spectrum).collect(),
+                ..Columns::default()
+            }
+        }
+        _ => unreachable!("the engine draws the others"),
+    };
+    if let Some(intensity) = &plan.intensity {
+        let elements = match intensity.scope {
+            IntensityScope::Scene => 1,
+            IntensityScope::Light => plan.count,
+        };
+        let scenes = scenes.clone();
+        let all = scenes.flat_map(|scene| (0..elements).map(move |element| (scene, element)));
+        columns.intensity = all.map(|(scene, e)| intensity.at(plan.stream, scene, e)).collect();
+        let each = columns.spectra.len() / columns.intensity.len();
+        let spectra = columns.spectra.to_mut().chunks_exact_mut(each);
+        for (spectra, intensity) in spectra.zip(&columns.intensity) {
+            spectra.iter_mut().for_each(|value| *value *= intensity);
+        }
+    }
+    Ok(columns)
+}
+
+impl<'a> Columns<'a> {
+    /// The arrays of the group that have an entry a scene.
+    fn arrays(self, plan: &'a GroupPlan) -> Vec<(&'a Array, Cow<'a, [u8]>)> {
+        let bytes = |content| match content {
+            Quantity::Spectra => cast_bytes(&self.spectra),
+            Quantity::Attempts => cast_bytes(&self.attempts),
+            Quantity::Intensity => Cow::Owned(bytemuck::cast_slice(&self.intensity).to_vec()),
+            Quantity::Lrv => Cow::Owned(bytemuck::cast_slice(&self.lrv).to_vec()),
+            Quantity::Xyz => Cow::Owned(bytemuck::cast_slice(&self.xyz).to_vec()),
+            Quantity::Weights | Quantity::LinearSrgb => unreachable!("no group has them"),
+        };
+        plan.arrays.iter().filter(|a| a.per_scene).map(|array| (array, bytes(array.quantity))).collect()
+    }
+}
+
+impl Columns<'_> {
+    /// The values of f32 besides spectra.
+    pub(super) fn known<'c>(&self, plan: &'c GroupPlan) -> Vec<(&'c Array, Vec<f32>)> {
+        let values = |array: &'c Array| {
+            let values = match array.quantity {
+                Quantity::Intensity => &self.intensity,
+                Quantity::Lrv => &self.lrv,
+                Quantity::Xyz => &self.xyz,
+                _ => return None,
+            };
+            Some((array, values.clone()))
+        };
+        plan.arrays.iter().filter_map(values).collect()
+    }
+}
+
+/// The bytes of values, without a copy where they are borrowed.
+fn cast_bytes<'a, T: bytemuck::Pod>(values: &Cow<'a, [T]>) -> Cow<'a, [u8]> {
+    match values {
+        Cow::Borrowed(values) => Cow::Borrowed(bytemuck::cast_slice(values)),
+        Cow::Owned(values) => Cow::Owned(bytemuck::cast_slice(values).to_vec()),
+    }
+}
+
+/// An error where a draw failed. There are `places` a scene, from scene `first` on.
+fn check(plan: &GroupPlan, places: u32, first: u64, statuses: &[DrawStatus]) -> Result<(), EngineError> {
+    let Some(failed) = statuses.iter().position(|&status| status == DrawStatus::FAILED) else {
+        return Ok(());
+    };
+    let (scene, element) = (failed as u64 / u64::from(places), failed as u64 % u64::from(places));
+    let (group, attempts) = (plan.name.clone(), plan.max_attempts);
+    Err(EngineError::ExhaustedInScene { group, scene: first + scene, element, attempts })
+}

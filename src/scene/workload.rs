@@ -1,0 +1,132 @@
+//! What drawing a scene takes, and what it is spared.
+
+use serde::Serialize;
+
+use super::Scene;
+use super::plan::{Array, GroupKind, GroupPlan, Shapes};
+use super::target::TargetPlan;
+
+/// What drawing a scene takes.
+#[derive(Clone, Debug, Serialize)]
+pub struct Workload {
+    /// The groups, in order.
+    pub groups: Vec<GroupWorkload>,
+    /// How many shaders are compiled, where a graphics adapter draws.
+    pub shaders: usize,
+    /// How many spectra are drawn for so many scenes, those of all scenes included.
+    pub draws: u64,
+    /// What is not done, and why.
+    pub left_out: Vec<String>,
+    /// How many bytes all arrays have.
+    pub bytes: u64,
+}
+
+/// What drawing a group takes.
+#[derive(Clone, Debug, Serialize)]
+pub struct GroupWorkload {
+    /// Its name.
+    pub name: String,
+    /// What its spectra are.
+    pub kind: GroupKind,
+    /// The number of the shader that draws it, from 1; none where the CPU does.
+    pub shader: Option<usize>,
+    /// How many spectra are drawn for each scene.
+    pub draws_per_scene: u64,
+    /// How many are drawn once for all.
+    pub draws_once: u64,
+    /// Its arrays.
+    pub arrays: Vec<Array>,
+}
+
+impl Scene {
+    /// What drawing so many scenes takes.
+    pub fn workload(&self, scenes: u64) -> Workload {
+        let mut programs: Vec<&crate::program::Program> = Vec::new();
+        let mut left_out = Vec::new();
+        let mut groups = Vec::new();
+        for plan in &self.plans {
+            let mut shader = None;
+            if let Some(drawing) = plan.drawn_by_engine() {
+                let program = drawing.recipe.program();
+                let known = programs.iter().position(|known| *known == program);
+                if let Some(known) = known {
+                    left_out.push(format!(
+                        "{}: no shader of its own, for its model and recipe are those of shader {}",
+                        plan.name,
+                        known + 1
+                    ));
+                }
+                shader = Some(
+                    1 + known.unwrap_or_else(|| {
+                        programs.push(program);
+                        programs.len() - 1
+                    }),
+                );
+            }
+            left_out.extend(spared(plan));
+            let (draws_per_scene, draws_once) = draws(plan);
+            groups.push(GroupWorkload {
+                name: plan.name.clone(),
+                kind: plan.kind,
+                shader,
+                draws_per_scene,
+                draws_once,
+                arrays: plan.arrays.clone(),
+            });
+        }
+        for (kind, name) in [
+            (GroupKind::Illuminant, "illuminants"),
+            (GroupKind::Surface, "surfaces"),
+            (GroupKind::Target, "targets"),
+        ] {
+            if self.plans.iter().all(|plan| plan.kind != kind) {
+                left_out
+                    .push(format!("{name}: the scene has none, and nothing is compiled or drawn for them"));
+            }
+        }
+        Workload {
+            shaders: programs.len(),
+            draws: groups.iter().map(|group| group.draws_once + scenes * group.draws_per_scene).sum(),
+            bytes: self.arrays().map(|a| a.bytes() as u64 * if a.per_scene { scenes } else { 1 }).sum(),
+            groups,
+            left_out,
+        }
+    }
+}
+
+/// How many spectra are drawn for each scene, and how many once.
+fn draws(plan: &GroupPlan) -> (u64, u64) {
+    match &plan.shapes {
+        Shapes::Engine(drawing) => (drawing.places.into(), 0),
+        Shapes::Once(drawing) => (0, drawing.places.into()),
+        Shapes::Target(target) => match **target {
+            TargetPlan::Once { .. } => (0, plan.count.into()),
+            TargetPlan::Flat { .. } => (0, 0),
+            _ => (plan.count.into(), 0),
+        },
+    }
+}
+
+/// What a group spares.
+fn spared(plan: &GroupPlan) -> Option<String> {
+    let name = &plan.name;
+    Some(match &plan.shapes {
+        Shapes::Once(_) if plan.intensity.is_some() => {
+            format!(
+                "{name}: its spectra are fixed, so they are drawn once, on the CPU, and only scaled for each scene"
+            )
+        }
+        Shapes::Once(_) => {
+            format!("{name}: it is fixed, so it is drawn and stored once, on the CPU without a shader")
+        }
+        Shapes::Engine(drawing) if drawing.places < plan.count => {
+            format!("{name}: its lights have the same shape, so one of {} is drawn", plan.count)
+        }
+        Shapes::Engine(_) => return None,
+        Shapes::Target(target) => match **target {
+            TargetPlan::Flat { .. } => format!("{name}: flat spectra are not drawn"),
+            TargetPlan::Once { .. } => format!("{name}: its copies have the same shape, so it is drawn once"),
+            _ => format!("{name}: targets are few, so they are drawn on the CPU without a shader"),
+        },
+    })
+}
