@@ -169,6 +169,7 @@ pub(crate) fn check_increasing(wavelengths: &[f64]) -> Result<(), GridError> {
 
 /// What a spectrum is outside the wavelengths at which it was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Extrapolation {
     /// Unknown: asking for it is an error.
     #[default]

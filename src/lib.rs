@@ -3,6 +3,8 @@
 
 // In the order in which the data pass through them: a room imports only from those above it.
 mod grid;
+#[doc(hidden)]
+pub mod suggestion;
 
 mod dataset;
 
@@ -50,8 +52,8 @@ pub use random::philox::philox;
 pub use random::real::Real;
 pub use random::stream::{DrawRange, Stream, StreamRng};
 pub use recipe::{
-    DEFAULT_MAX_ATTEMPTS, Draw, Intensity, ProposalKind, Recipe, RecipeBuilder, RecipeError, ScalarSampler,
-    XyzScale,
+    CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Illuminant, Intensity, ProposalKind, Recipe, RecipeBuilder,
+    RecipeError, RecipeSettings, ScalarSampler, XyzScale,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
 pub use wgpu;

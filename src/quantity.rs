@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Something that a draw can give. Each is an array of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum), value(rename_all = "snake_case"))]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
     /// The spectrum: a value for each band, after scaling where there is a target or an intensity.
@@ -26,8 +27,8 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All of them.
-    pub const ALL: [Quantity; 7] = [
+    /// Every quantity.
+    pub const ALL: &[Quantity] = &[
         Quantity::Spectra,
         Quantity::Weights,
         Quantity::Xyz,
@@ -36,6 +37,28 @@ impl Quantity {
         Quantity::Attempts,
         Quantity::Intensity,
     ];
+
+    /// How many there are.
+    pub(crate) const COUNT: usize = Quantity::ALL.len();
+
+    /// The name of the axis that its values run over within a draw, in files; `None` where a draw has one value.
+    pub fn axis(self) -> Option<&'static str> {
+        match self {
+            Quantity::Spectra => Some("wavelength"),
+            Quantity::Weights => Some("component"),
+            Quantity::Xyz | Quantity::LinearSrgb => Some("channel"),
+            Quantity::Lrv | Quantity::Attempts | Quantity::Intensity => None,
+        }
+    }
+
+    /// The names of its values, where each has one of its own.
+    pub fn channels(self) -> &'static [&'static str] {
+        match self {
+            Quantity::Xyz => &["X", "Y", "Z"],
+            Quantity::LinearSrgb => &["R", "G", "B"],
+            _ => &[],
+        }
+    }
 
     /// Its name, as shaders, files and the command line have it.
     pub fn name(self) -> &'static str {
@@ -93,20 +116,25 @@ impl ValueRange {
 
 /// The type of a value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Dtype {
     /// IEEE half precision: 11 significant bits, nothing above 65,504. Two make a word of a shader, the first its low
     /// half.
     #[serde(rename = "float16")]
+    #[cfg_attr(feature = "cli", value(name = "f16"))]
     F16,
     /// IEEE single precision.
     #[default]
     #[serde(rename = "float32")]
+    #[cfg_attr(feature = "cli", value(name = "f32"))]
     F32,
     /// IEEE double precision: of files, not of draws.
     #[serde(rename = "float64")]
+    #[cfg_attr(feature = "cli", value(name = "f64"))]
     F64,
     /// An unsigned integer of 32 bits.
     #[serde(rename = "uint32")]
+    #[cfg_attr(feature = "cli", value(skip))]
     U32,
 }
 
@@ -189,8 +217,7 @@ mod tests {
 
     #[test]
     fn sizes() {
-        let format =
-            |layout, element| ArrayFormat { quantity: Quantity::Spectra, element, width: 31, layout };
+        let format = |layout, dtype| ArrayFormat { quantity: Quantity::Spectra, dtype, width: 31, layout };
         assert_eq!(format(Layout::Rows, Dtype::F32).bytes(5), 4 * 31 * 5);
         assert_eq!(format(Layout::PaddedRows, Dtype::F32).bytes(5), 4 * 32 * 5);
         assert_eq!(format(Layout::Planes, Dtype::F16).bytes(5), 2 * 31 * 8);

@@ -54,7 +54,7 @@ fn extremes_are_covered_and_physical_and_the_same_on_every_engine() {
         // Six standard errors of 65,536 candidates, and the last digit of those known to three.
         let error = (recipe.probability() / probability - 1.0).abs();
         assert!(recipe.acceptance() > 0.1 && error < 0.06, "{name}: {} {error}", recipe.acceptance());
-        assert!(recipe.cover().is_some_and(|(_, bytes)| bytes <= 256 << 10));
+        assert!(recipe.cover().is_some_and(|cover| cover.bytes <= 256 << 10));
         let draws = Stream::named(40, &name).draws((1 << 32) - 77..(1 << 32) - 77 + COUNT);
         let (ours, theirs) = (rows(&cpu, &recipe, draws), rows(&gpu, &recipe, draws));
         assert!(!software || ours == theirs, "{name}");
@@ -127,7 +127,7 @@ fn a_cover_draws_what_plain_rejection_draws() {
 /// Quantities besides spectra are maps of the cover's coordinates, too.
 #[test]
 fn quantities_come_from_a_cover() {
-    let wanted = Quantity::ALL.into_iter().filter(|q| *q != Quantity::Intensity);
+    let wanted = Quantity::ALL.iter().copied().filter(|q| *q != Quantity::Intensity);
     let recipe = near_white(0.98).quantities(wanted).build().expect("it can be drawn");
     let model = recipe.model().clone();
     let xyz = colorimetry::xyz_weights(model.grid()).expect("it is visible");

@@ -112,7 +112,7 @@ fn what_does_not_fit_is_refused_with_the_limit() {
 
     let model = Model::builtin("munsell-vrhel").expect("it is built in");
     let many = Recipe::builder(&model)
-        .quantities(Quantity::ALL.into_iter().filter(|q| *q != Quantity::Intensity))
+        .quantities(Quantity::ALL.iter().copied().filter(|q| *q != Quantity::Intensity))
         .build()
         .expect("it can be drawn");
     let error = Sampler::new(&device, &many).unwrap_err();

@@ -4,8 +4,8 @@
 use std::sync::OnceLock;
 
 use spectroll::{
-    ArrayFormat, Bounds, DrawRange, Dtype, Engine, EngineChoice, EngineError, Intensity, Layout, Model,
-    Quantity, Recipe, RecipeBuilder, Stream, XyzScale, colorimetry,
+    ArrayFormat, Bounds, DrawRange, Dtype, Engine, EngineChoice, EngineError, Illuminant, Intensity, Layout,
+    Model, Quantity, Recipe, RecipeBuilder, Stream, XyzScale, colorimetry,
 };
 
 /// Draws of each recipe: not a multiple of 4, so that planes have padding and pairs a half.
@@ -36,7 +36,7 @@ fn lights() -> RecipeBuilder {
 }
 
 fn all_but(quantity: Quantity) -> impl Iterator<Item = Quantity> {
-    Quantity::ALL.into_iter().filter(move |q| *q != quantity)
+    Quantity::ALL.iter().copied().filter(move |q| *q != quantity)
 }
 
 /// Recipes that ask for all that they can.
@@ -46,7 +46,7 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
     let grid = Model::builtin("munsell-vrhel").expect("it is built in").grid();
     let recipes = [
         ("reflectances", reflected(surfaces())),
-        ("reflectances under A", reflected(surfaces()).illuminant(&colorimetry::illuminant_a(grid))),
+        ("reflectances under A", reflected(surfaces()).illuminant(Illuminant::A)),
         ("LRV 0.4", reflected(surfaces()).lrv(0.4)),
         ("LRV 0.6, scaled", reflected(surfaces()).lrv(0.6).bounds(Bounds::Scaled)),
         ("log-uniform lights", shining(lights()).intensity(Intensity::LogUniform(0.15, 150.0))),
@@ -74,7 +74,7 @@ fn values(engine: &Engine, recipe: &Recipe, draws: DrawRange) -> Vec<(ArrayForma
                     Layout::Planes => j * batch.draws.count.next_multiple_of(4) as usize + i,
                     _ => i * format.stride() + j,
                 };
-                words.push(match format.element {
+                words.push(match format.dtype {
                     Dtype::F16 => u16::from_le_bytes([bytes[2 * at], bytes[2 * at + 1]]).into(),
                     _ => u32::from_le_bytes(bytes[4 * at..4 * at + 4].try_into().expect("there are 4")),
                 });
@@ -94,7 +94,9 @@ fn every_layout_has_the_same_values_on_every_engine() {
         for half in [false, true] {
             let ask = |builder: RecipeBuilder| {
                 let builder = builder.layout(layout);
-                (if half { builder.half_spectra() } else { builder }).build().expect("it can be drawn")
+                (if half { builder.spectra_dtype(Dtype::F16) } else { builder })
+                    .build()
+                    .expect("it can be drawn")
             };
             let recipes = [
                 ask(surfaces().quantities(all_but(Quantity::Intensity)).lrv(0.4)),
@@ -178,7 +180,7 @@ fn programs_in_loops_have_the_same_values_on_every_engine() {
         for half in [false, true] {
             let builder =
                 Recipe::builder(&model).quantities(all_but(Quantity::Intensity)).lrv(0.4).layout(layout);
-            let builder = if half { builder.half_spectra() } else { builder };
+            let builder = if half { builder.spectra_dtype(Dtype::F16) } else { builder };
             let recipe = builder.build().expect("it can be drawn");
             let draws = Stream::new(33).draws(0..1003);
             let (ours, theirs) = (values(&cpu(), &recipe, draws), values(gpu(), &recipe, draws));
@@ -244,7 +246,7 @@ fn values_are_those_of_f64() {
         let listed = recipe.formats().into_iter().map(|f| f.quantity).filter(|q| *q != Quantity::Attempts);
         let listed: Vec<_> = listed.map(|q| format!("{q} {:.1e}", worst[q as usize])).collect();
         println!("{name}: {}", listed.join(", "));
-        for quantity in Quantity::ALL {
+        for quantity in Quantity::ALL.iter().copied() {
             assert!(worst[quantity as usize] < BOUND, "{name}: {quantity} {:e}", worst[quantity as usize]);
         }
         // Of a white that is 1, whatever the surface reflects.

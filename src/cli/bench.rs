@@ -9,11 +9,12 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use spectroll::evaluation::costs::{Costs, Share};
 use spectroll::{
-    Bounds, BuiltinTable, Dataset, Engine, EngineChoice, Extrapolation, Fit, Grid, Intensity, Layout, Model,
-    Quantity, Recipe, RecipeBuilder, SpectrumKind, Stream, adapters,
+    Bounds, BuiltinTable, Dataset, Dtype, Engine, EngineChoice, Extrapolation, Fit, Grid, Intensity, Layout,
+    Model, Quantity, Recipe, RecipeBuilder, SpectrumKind, Stream, adapters,
 };
 
-use super::{EngineArguments, check_interrupt, model, watch_interrupts};
+use super::options::EngineArguments;
+use super::{interrupt, model};
 
 /// How long one run should take, seconds.
 const RUN: f64 = 0.4;
@@ -85,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let recipes = recipes.collect::<anyhow::Result<Vec<_>>>()?;
     let seconds = if arguments.costs { SHORT_RUN } else { RUN };
     let width = recipes.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    watch_interrupts();
+    interrupt::watch();
     let mut all = Measured::default();
     for choice in choices {
         let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
@@ -142,7 +143,7 @@ fn costs() -> anyhow::Result<Vec<(String, RecipeBuilder)>> {
         let data = Dataset::new(&tables, grid.parse::<Grid>()?, Extrapolation::Error)?;
         anyhow::Ok(Recipe::builder(&Fit::new(SpectrumKind::Reflectance).components(components).fit(&data)?))
     };
-    let everything = Quantity::ALL.into_iter().filter(|q| *q != Quantity::Intensity);
+    let everything = Quantity::ALL.iter().copied().filter(|q| *q != Quantity::Intensity);
     Ok([
         ("reflectances: spectra, 31 bands, 6 components", surfaces()),
         ("  attempts alone", surfaces().quantities([Quantity::Attempts])),
@@ -151,7 +152,7 @@ fn costs() -> anyhow::Result<Vec<(String, RecipeBuilder)>> {
         ("  srgb", surfaces().quantities([Quantity::LinearSrgb])),
         ("  weights", surfaces().quantities([Quantity::Weights])),
         ("  everything", surfaces().quantities(everything)),
-        ("  spectra in 16 bits", surfaces().half_spectra()),
+        ("  spectra in 16 bits", surfaces().spectra_dtype(Dtype::F16)),
         ("  spectra in padded rows", surfaces().layout(Layout::PaddedRows)),
         ("  spectra in planes", surfaces().layout(Layout::Planes)),
         ("  spectra, nothing rejected (covariance x 0.01)", surfaces().covariance_scale(0.01)),
@@ -177,7 +178,7 @@ fn parts(engine: &Engine, runs: u32) -> anyhow::Result<Option<Vec<Share>>> {
         return Ok(None);
     };
     for _ in 0..runs {
-        check_interrupt()?;
+        interrupt::check()?;
         costs.run()?;
     }
     Ok(Some(costs.shares()))
@@ -187,7 +188,7 @@ fn measure(engine: &Engine, name: &str, recipe: &Recipe, runs: u32, seconds: f64
     let mut session = engine.session(recipe)?;
     let mut time = |count: u64| {
         let start = Instant::now();
-        session.draw(Stream::new(0).draws(0..count), |_| anyhow::Ok(check_interrupt()?))?;
+        session.draw(Stream::new(0).draws(0..count), |_| anyhow::Ok(interrupt::check()?))?;
         anyhow::Ok(start.elapsed().as_secs_f64())
     };
     // The first run pays for compiling the shader; the second says how many draws fill the time.

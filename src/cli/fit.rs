@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
 use spectroll::output::write_file;
 use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, Grid, Model, Normalization, SpectrumKind, Table};
 
-use super::{Usage, existing, grouped};
+use super::exit::Usage;
+use super::if_exists;
+use super::parse::grouped;
 
 /// Fit a model to measured spectra
 ///
@@ -24,48 +25,22 @@ pub(crate) struct Arguments {
     components: usize,
     /// What the spectra are [default: what the name of the variable says: sur_X, spd_X, daylightX]
     #[arg(long, value_enum)]
-    kind: Option<KindName>,
+    kind: Option<SpectrumKind>,
     /// The wavelengths, start:step:stop in nm [default: 400:10:700]
     #[arg(long, value_name = "GRID")]
     wavelengths: Option<Grid>,
     /// What each spectrum is divided by first [default: mean for illuminants, none for reflectances]
     #[arg(long, value_enum)]
-    normalize: Option<NormalizationName>,
+    normalize: Option<Normalization>,
     /// What a spectrum is outside the wavelengths at which it was measured
     #[arg(long, value_enum, default_value = "error")]
-    extend: ExtendName,
+    extrapolate: Extrapolation,
     /// The model file
     #[arg(short, long, value_name = "MODEL.json")]
     output: PathBuf,
     /// Replace the model file if it exists
     #[arg(long)]
     force: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum KindName {
-    Reflectance,
-    Illuminant,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum NormalizationName {
-    /// Its mean power
-    Mean,
-    /// Its integral over the wavelengths
-    Integral,
-    /// Nothing
-    None,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum ExtendName {
-    /// Unknown, and so an error
-    Error,
-    /// What it is at the nearer end
-    Hold,
-    /// Zero
-    Zero,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -75,22 +50,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .map(|file| table(file, arguments.wavelengths))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let kind = kind(arguments, &tables)?;
-    let extend = match arguments.extend {
-        ExtendName::Error => Extrapolation::Error,
-        ExtendName::Hold => Extrapolation::Hold,
-        ExtendName::Zero => Extrapolation::Zero,
-    };
-    let data = Dataset::new(&tables, arguments.wavelengths.unwrap_or(Grid::DEFAULT), extend)?;
+    let data = Dataset::new(&tables, arguments.wavelengths.unwrap_or(Grid::DEFAULT), arguments.extrapolate)?;
     let mut fit = Fit::new(kind).components(arguments.components);
     if let Some(normalize) = arguments.normalize {
-        fit = fit.normalization(match normalize {
-            NormalizationName::Mean => Normalization::Mean,
-            NormalizationName::Integral => Normalization::Integral,
-            NormalizationName::None => Normalization::None,
-        });
+        fit = fit.normalization(normalize);
     }
     let model = fit.fit(&data)?;
-    write_file(&arguments.output, existing(arguments.force), (model.to_json() + "\n").as_bytes())?;
+    write_file(&arguments.output, if_exists(arguments.force), (model.to_json() + "\n").as_bytes())?;
     report(&model, &data, &arguments.output);
     Ok(())
 }
@@ -123,10 +89,7 @@ fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
 /// What the spectra are: as said, else as their names say, if those agree.
 fn kind(arguments: &Arguments, tables: &[Table]) -> anyhow::Result<SpectrumKind> {
     if let Some(kind) = arguments.kind {
-        return Ok(match kind {
-            KindName::Reflectance => SpectrumKind::Reflectance,
-            KindName::Illuminant => SpectrumKind::Illuminant,
-        });
+        return Ok(kind);
     }
     let kinds: Vec<_> = tables.iter().map(Table::kind).collect();
     let first = kinds[0].filter(|first| kinds.iter().all(|kind| *kind == Some(*first)));

@@ -8,11 +8,11 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use spectroll::{Model, Normalization, Recipe, RecipeError};
+use spectroll::{CoverSize, Model, Normalization, Recipe, RecipeError};
 
-use super::picture_file;
-use super::request::Request;
-use super::{existing, grouped, picture};
+use super::options::RecipeArguments;
+use super::parse::grouped;
+use super::{if_exists, picture};
 
 /// Show what a model is: a table, and a picture where asked
 #[derive(clap::Args)]
@@ -26,7 +26,7 @@ pub(crate) struct Arguments {
     pub(crate) output: Option<PathBuf>,
 
     #[command(flatten)]
-    request: Request,
+    request: RecipeArguments,
 
     /// The seed of the draws in the picture
     #[arg(long, default_value_t = 0)]
@@ -39,12 +39,13 @@ pub(crate) struct Arguments {
 
 /// Prints the table, after making the picture where one is asked for.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let format = arguments.output.as_deref().map(picture_file::format).transpose()?;
+    let format = arguments.output.as_deref().map(picture::format).transpose()?;
     let model = super::model(&arguments.model)?;
     let recipe = arguments.request.recipe(&model);
     if let (Some(path), Some(format)) = (&arguments.output, format) {
-        let figure = picture::Picture { model: &model, recipe: recipe.as_ref().ok(), seed: arguments.seed };
-        picture_file::write(&figure.drawing(), path, format, existing(arguments.force))?;
+        let figure =
+            picture::model::Picture { model: &model, recipe: recipe.as_ref().ok(), seed: arguments.seed };
+        picture::write(&figure.drawing(), path, format, if_exists(arguments.force))?;
     }
     let table = table(&arguments.model, &model, &recipe);
     std::io::stdout().lock().write_all(table.as_bytes())?;
@@ -122,7 +123,7 @@ fn candidates(recipe: &Recipe) -> String {
     let each = 1.0 / recipe.acceptance();
     match recipe.cover() {
         None => format!("the model's Gaussian: {each:.2} for each draw"),
-        Some((boxes, bytes)) => format!(
+        Some(CoverSize { boxes, bytes, .. }) => format!(
             "{} boxes, a table of {} KB: {each:.2} for each draw, at about twice the cost of the Gaussian's, of which \
              a draw would take {:.3e}",
             grouped(boxes as u64),

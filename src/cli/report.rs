@@ -11,7 +11,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use spectroll::evaluation::report::{Effort, Options, Report, ReportError, Verdict, figures, measure, page};
 use spectroll::{EngineChoice, adapters};
 
-use super::{EngineArguments, Interrupted, Usage, check_interrupt, folder, model, watch_interrupts};
+use super::exit::Usage;
+use super::interrupt::{self, Interrupted};
+use super::options::EngineArguments;
+use super::{folder, model};
 
 /// Measure error against run time, accuracy, randomness and extreme cases, as a page with plots
 ///
@@ -57,10 +60,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         },
         seed: arguments.seed,
     };
-    watch_interrupts();
+    interrupt::watch();
     let report = watched(&options)?;
     write(&folder, &report)?;
-    check_interrupt()?;
+    interrupt::check()?;
     folder.finish()?;
     let mut out = std::io::stdout().lock();
     write!(out, "{}", report.summary())?;
@@ -105,7 +108,7 @@ fn watched(options: &Options) -> anyhow::Result<Report> {
             bar.set_message(what.to_owned());
             last.replace(what.to_owned());
         }
-        check_interrupt().is_ok()
+        interrupt::check().is_ok()
     });
     bar.finish_and_clear();
     match result {

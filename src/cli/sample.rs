@@ -1,19 +1,19 @@
 //! `spectroll sample`: draws of a model, into a data set.
 
 use std::io::{self, Write};
-use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
 use serde::Serialize;
-use spectroll::output::{Schema, SetStatus};
-use spectroll::{DrawRange, DrawSummary, Engine, EngineChoice, EngineError, Recipe, Session, Stream};
+use spectroll::export::{DrawExport, Writing};
+use spectroll::output::SetStatus;
+use spectroll::{DrawRange, DrawSummary, EngineChoice, Stream};
 
-use super::dry_run::DryRun;
-use super::request::{self, Request};
-use super::run::{Run, Source, Window};
-use super::sink::OutputArguments;
-use super::{EngineArguments, Usage, count, grouped, model};
+use super::exit::Usage;
+use super::options::{EngineArguments, OutputArguments, RecipeArguments};
+use super::parse::{count, grouped};
+use super::run::{self, DryRun};
+use super::{interrupt, model};
 
 /// Draw spectra from a model
 ///
@@ -37,9 +37,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
     #[command(flatten)]
-    request: Request,
+    request: RecipeArguments,
     #[command(flatten)]
-    pub(super) output: OutputArguments,
+    output: OutputArguments,
     #[command(flatten)]
     engine: EngineArguments,
     /// Say what would be made, how large it would be and how long it would take, and make nothing
@@ -75,8 +75,7 @@ struct Report {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let choice = arguments.engine.choice().unwrap_or_default();
-    let target = arguments.output.target()?;
+    let output = arguments.output.resolve()?;
     let model = model(&arguments.model)?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
@@ -85,31 +84,27 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None => Stream::new(arguments.seed),
     };
     let draws = DrawRange { stream, first: arguments.start, count: arguments.count };
-    let schema = schema(arguments, &recipe, draws);
-    arguments.output.check(target, &schema)?;
+    // A folder on this machine is nobody else's business.
+    let name = Path::new(&arguments.model).file_name().unwrap_or_default().to_string_lossy();
+    let export = DrawExport::new(&recipe, draws).model_name(&name).stream_name(arguments.stream.as_deref());
+    let schema = export.schema(&output);
+    output.check(&schema)?;
 
-    let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
+    let engine = arguments.engine.open()?;
     if arguments.dry_run {
-        let dry_run = DryRun::new(&arguments.output, target, &schema, &recipe, &engine)?;
-        return dry_run.print(arguments.json);
+        return DryRun::new(&output, &schema, &recipe, &engine)?.print(arguments.json);
     }
-    let why = match (&choice, engine.adapter()) {
+    let why = match (arguments.engine.choice().unwrap_or_default(), engine.adapter()) {
         (EngineChoice::Auto, None) => ", no graphics hardware was found",
         _ => "",
     };
 
     let start = Instant::now();
-    let mut rows = Rows::new(&recipe, &engine, draws)?;
-    let run = Run {
-        output: &arguments.output,
-        target,
-        schema,
-        spd: (request::spd_name(&arguments.request, model.kind()), draws.first),
-        companions: &[("model.json", &model.to_json())],
-        engine: &engine,
-        quiet: arguments.quiet,
-    };
-    let outcome = run.open(&mut rows)?.make(&mut rows)?;
+    let mut rows = export.rows(&engine)?;
+    let writing = interrupt::around(&output, || {
+        Writing::open(&output, schema, &export.companions(), &engine, &mut rows).map_err(run::failed)
+    })?;
+    let outcome = run::make(writing, &mut rows, (arguments.quiet, arguments.output.to_stdout()))?;
     let summary = rows.summary;
     let seconds = start.elapsed().as_secs_f64();
     report(
@@ -132,52 +127,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             version: env!("CARGO_PKG_VERSION"),
         },
     )
-}
-
-/// What the data set is to hold, and what it is made from.
-fn schema(arguments: &Arguments, recipe: &Recipe, draws: DrawRange) -> Schema {
-    // A folder on this machine is nobody else's business.
-    let name = Path::new(&arguments.model).file_name().unwrap_or_default().to_string_lossy();
-    let stream = (&arguments.stream, draws.stream);
-    Schema {
-        attributes: request::attributes(&name, &arguments.request, recipe, stream, draws.first),
-        ..request::schema(recipe, draws.count, arguments.output.element())
-    }
-}
-
-/// Draws of a recipe as rows of a data set.
-pub(super) struct Rows<'a> {
-    recipe: &'a Recipe,
-    session: Session<'a>,
-    draws: DrawRange,
-    /// What those took that were drawn.
-    pub(super) summary: DrawSummary,
-}
-
-impl<'a> Rows<'a> {
-    pub(super) fn new(
-        recipe: &'a Recipe,
-        engine: &'a Engine,
-        draws: DrawRange,
-    ) -> Result<Rows<'a>, EngineError> {
-        Ok(Rows { recipe, session: engine.session(recipe)?, draws, summary: DrawSummary::default() })
-    }
-}
-
-impl Source for Rows<'_> {
-    fn rounding(&mut self) -> Result<String, EngineError> {
-        request::rounding(self.recipe, &mut self.session)
-    }
-
-    fn draw(&mut self, rows: Range<u64>, window: &mut Window) -> anyhow::Result<()> {
-        let first = self.draws.first.wrapping_add(rows.start);
-        let draws = DrawRange { first, count: rows.end - rows.start, ..self.draws };
-        self.summary += self.session.draw(draws, |batch| {
-            let columns = request::columns(self.recipe, &batch);
-            window(&columns.iter().map(|column| &**column).collect::<Vec<_>>(), batch.draws.count)
-        })?;
-        Ok(())
-    }
 }
 
 fn report(arguments: &Arguments, outcome: SetStatus, made: &Report) -> anyhow::Result<()> {

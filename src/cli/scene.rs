@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde::Serialize;
-use serde_json::{Map, Value, json};
 use spectroll::Engine;
 use spectroll::evaluation::plot::PictureFormat;
-use spectroll::output::{PendingFile, Schema, SetStatus, SpdName};
-use spectroll::scene::{GroupKind, GroupSummary, PRESETS, Scene, Workload};
+use spectroll::export::{ArraySelection, ExportError, Output, SceneExport, Writing};
+use spectroll::output::{PendingFile, Schema, SetStatus};
+use spectroll::scene::{GroupSummary, PRESETS, Scene, Workload};
 
-use super::dry_run::{free, room, size};
-use super::picture_file;
-use super::preview::Preview;
-use super::run::Run;
-use super::scene_rows::{self, Rows, Selection, element};
-use super::sink::{Destination, OutputArguments};
-use super::{EngineArguments, Usage, existing, grouped};
+use super::exit::Usage;
+use super::interrupt;
+use super::options::{EngineArguments, OutputArguments};
+use super::parse::{grouped, size};
+use super::picture;
+use super::picture::scene::Preview;
+use super::run::{self, free, room};
 
 /// Draw scenes of lights, surfaces and targets, as a file says
 ///
@@ -34,8 +34,12 @@ pub(crate) struct Arguments {
     /// Use a built-in scene file; without -o, --preview or --dry-run, print it
     #[arg(long, value_name = "NAME", value_parser = PRESETS.map(|(name, _)| name))]
     example: Option<String>,
-    #[command(flatten)]
-    selection: Selection,
+    /// Draw this group alone
+    #[arg(long, value_name = "GROUP")]
+    only: Option<String>,
+    /// Write these arrays alone, by the names that --dry-run lists
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    arrays: Vec<String>,
     /// Draw these scenes, B excluded [default: all]
     #[arg(long, value_name = "A..B", value_parser = range)]
     scenes: Option<Range<u64>>,
@@ -78,13 +82,14 @@ struct Report {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (name, text) = source(arguments)?;
     let output = &arguments.output;
-    let to_somewhere = !output.output.as_os_str().is_empty();
+    let to_somewhere = output.is_given();
     let idle = !to_somewhere && arguments.preview.is_none() && !arguments.dry_run;
     if idle && arguments.example.is_some() {
         return Ok(io::stdout().write_all(text.as_bytes())?);
     }
     let folder = arguments.file.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
-    let scene = arguments.selection.of(Scene::parse(&name, &text, folder)?)?;
+    let selection = ArraySelection { only: arguments.only.clone(), arrays: arguments.arrays.clone() };
+    let scene = selection.apply(Scene::parse(&name, &text, folder)?)?;
     let scenes = arguments.scenes.clone().unwrap_or(0..scene.scenes());
     if scenes.end > scene.scenes() {
         let all = scene.scenes();
@@ -94,12 +99,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if idle {
         return Err(Usage("say where to with -o, or ask for --dry-run or --preview".to_owned()).into());
     }
-    let job = Job { arguments, name: &name, text: &text, scene: &scene, scenes };
+    // A folder on this machine is nobody else's business.
+    let file = Path::new(&name).file_name().unwrap_or_default().to_string_lossy();
+    let export = SceneExport::new(&scene, scenes.clone()).selection(selection.clone()).file(&file, &text);
+    let job = Job { arguments, name: &name, scene: &scene, scenes, selection, export };
     // What cannot be written is found out before anything is drawn.
     let made = if to_somewhere { Some(job.made()?) } else { None };
     let picture = arguments.preview.as_deref().map(|path| job.picture(path)).transpose()?;
-    let engine =
-        Engine::with_threads(&arguments.engine.choice().unwrap_or_default(), arguments.engine.threads)?;
+    let engine = arguments.engine.open()?;
     if arguments.dry_run {
         return job.dry_run(&engine);
     }
@@ -137,9 +144,10 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 struct Job<'a> {
     arguments: &'a Arguments,
     name: &'a str,
-    text: &'a str,
     scene: &'a Scene,
     scenes: Range<u64>,
+    selection: ArraySelection,
+    export: SceneExport<'a>,
 }
 
 /// A picture that can be written.
@@ -149,10 +157,10 @@ struct Picture<'a> {
 }
 
 impl Picture<'_> {
-    fn make(&self, job: &Job, engine: &Engine) -> anyhow::Result<()> {
-        let existing = existing(job.arguments.output.force);
+    fn make(&self, job: &Job<'_>, engine: &Engine) -> anyhow::Result<()> {
+        let existing = job.arguments.output.if_exists();
         let drawing = Preview::new(job.scene, engine, &job.scenes)?.drawing();
-        picture_file::write(&drawing, self.path, self.format, existing)
+        picture::write(&drawing, self.path, self.format, existing)
     }
 }
 
@@ -162,24 +170,21 @@ impl Job<'_> {
     }
 
     /// What is to be written and how, if that can be.
-    fn made(&self) -> anyhow::Result<(Destination, Schema)> {
-        let output = &self.arguments.output;
-        if self.arguments.json && output.to_stdout() {
+    fn made(&self) -> anyhow::Result<(Output, Schema)> {
+        if self.arguments.json && self.arguments.output.to_stdout() {
             return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
         }
-        let target = output.target()?;
-        let stored = (target, output.element());
-        let mut schema = scene_rows::schema(self.scene, &self.arguments.selection, stored, self.count());
-        output.check(target, &schema)?;
-        schema.attributes = attributes(self);
-        Ok((target, schema))
+        let output = self.arguments.output.resolve()?;
+        let schema = self.export.schema(&output);
+        output.check(&schema)?;
+        Ok((output, schema))
     }
 
     /// A picture of these scenes at `path`, if it can be written.
     fn picture<'p>(&self, path: &'p Path) -> anyhow::Result<Picture<'p>> {
-        let format = picture_file::format(path)?;
+        let format = picture::format(path)?;
         if !self.arguments.dry_run {
-            PendingFile::create(path, existing(self.arguments.output.force))?;
+            PendingFile::create(path, self.arguments.output.if_exists())?;
         }
         Ok(Picture { path, format })
     }
@@ -187,30 +192,19 @@ impl Job<'_> {
     fn run(
         &self,
         engine: &Engine,
-        (target, mut schema): (Destination, Schema),
+        (output, schema): (Output, Schema),
         picture: Option<Picture>,
     ) -> anyhow::Result<()> {
         let start = Instant::now();
-        let mut rows = Rows::new(self.scene, engine, &schema, self.scenes.start)?;
-        schema.constants = rows.constants(&schema);
-        let spd = match scene_rows::role(self.scene) {
-            GroupKind::Illuminant => SpdName::Illuminant,
-            GroupKind::Surface | GroupKind::Destination => SpdName::Reflectance,
-        };
-        let run = Run {
-            output: &self.arguments.output,
-            target,
-            schema,
-            spd: (spd, self.scenes.start),
-            companions: &[("scene.toml", self.text)],
-            engine,
-            quiet: self.arguments.quiet,
-        };
-        let open = run.open(&mut rows)?;
+        let mut rows = self.export.rows(engine, &schema)?;
+        let writing = interrupt::around(&output, || {
+            Writing::open(&output, schema, &self.export.companions(), engine, &mut rows).map_err(run::failed)
+        })?;
         if let Some(error) = picture.and_then(|picture| picture.make(self, engine).err()) {
-            return Err(open.stop(error));
+            return Err(run::failed(writing.stop(ExportError::Host(error.into()))));
         }
-        let outcome = open.make(&mut rows)?;
+        let (quiet, to_stdout) = (self.arguments.quiet, self.arguments.output.to_stdout());
+        let outcome = run::make(writing, &mut rows, (quiet, to_stdout))?;
         self.report(engine, rows.drawn, outcome, start.elapsed().as_secs_f64())
     }
 
@@ -260,7 +254,7 @@ impl Job<'_> {
         }
         for group in &mut workload.groups {
             let all = group.arrays.len();
-            group.arrays.retain(|array| self.arguments.selection.has(array));
+            group.arrays.retain(|array| self.selection.has(array));
             if group.arrays.len() < all {
                 workload.left_out.push(format!("{}: arrays that --arrays does not name", group.name));
             }
@@ -304,7 +298,7 @@ impl Job<'_> {
             for array in &group.arrays {
                 let scenes = array.per_scene.then_some(self.count() as usize);
                 let shape: Vec<_> = scenes.into_iter().chain(array.shape.iter().copied()).collect();
-                writeln!(out, "    {}: {shape:?} {}", array.name, element(array).name())?;
+                writeln!(out, "    {}: {shape:?} {}", array.name, array.dtype().name())?;
             }
         }
         writeln!(out, "  left out:")?;
@@ -323,25 +317,9 @@ impl Job<'_> {
             size(workload.bytes)
         )?;
         let output = &self.arguments.output;
-        if !output.to_stdout() && !output.output.as_os_str().is_empty() {
+        if !output.to_stdout() && output.is_given() {
             writeln!(out, "  {}", room(&output.output, workload.bytes, free(&output.output)))?;
         }
         Ok(())
     }
-}
-
-/// What scenes are made from.
-fn attributes(job: &Job) -> Map<String, Value> {
-    let attributes = json!({
-        // A folder on this machine is nobody else's business.
-        "scene_file": Path::new(job.name).file_name().unwrap_or_default().to_string_lossy(),
-        "scene": job.text,
-        "models_blake3": scene_rows::models(job.scene),
-        "selection": job.arguments.selection,
-        "seed": job.scene.seed(),
-        "start": job.scenes.start,
-        "program": concat!("spectroll ", env!("CARGO_PKG_VERSION")),
-    });
-    let Value::Object(attributes) = attributes else { unreachable!("it is written as one") };
-    attributes
 }

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::model;
-use super::request::Request;
+use super::options::RecipeArguments;
 
 /// Print the draw as WGSL functions, for a shader of your own
 ///
@@ -17,7 +17,7 @@ pub(crate) struct Arguments {
     #[arg(value_name = "MODEL")]
     model: String,
     #[command(flatten)]
-    request: Request,
+    request: RecipeArguments,
     /// What every name starts with
     #[arg(long, default_value = "spectroll")]
     prefix: String,

@@ -9,15 +9,15 @@ use rand::Rng;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use spectroll::export::provenance::model_sum;
+use spectroll::export::{ArraySelection, DrawRows, ExportError, Rows, SceneRows, model_sums};
 use spectroll::output::{Schema, SetAudit, merge};
 use spectroll::scene::Scene;
-use spectroll::{DrawRange, Engine, EngineChoice, EngineError, Model, Recipe, Stream};
+use spectroll::{DrawRange, Engine, EngineChoice, EngineError, Model, Recipe, RecipeSettings, Stream};
 
-use super::request::Request;
-use super::run::Source;
-use super::sample;
-use super::scene_rows::{self, Selection};
-use super::{EngineArguments, Unverified, check_interrupt, grouped, watch_interrupts};
+use super::exit::Unverified;
+use super::options::EngineArguments;
+use super::parse::grouped;
+use super::{interrupt, run as runs};
 
 /// Check a .zarr or a folder of parts against its manifest, and draw some of it again
 #[derive(clap::Args)]
@@ -53,12 +53,12 @@ pub(crate) fn join(arguments: &MergeArguments) -> anyhow::Result<()> {
 }
 
 pub(crate) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
-    watch_interrupts();
+    interrupt::watch();
     let audit = SetAudit::open(&arguments.path)?;
     let chunks = audit.chunks();
     let mut faults = Vec::new();
     for &chunk in &chunks {
-        check_interrupt()?;
+        interrupt::check()?;
         faults.extend(audit.fault(chunk));
     }
     let again = chosen(&chunks, arguments.redraw);
@@ -137,12 +137,12 @@ impl Made {
 
     fn draws(attributes: &Attributes) -> anyhow::Result<Made> {
         let sum: String = attributes.read("model_blake3")?;
-        let model = Model::load(&attributes.path.join("model.json"))?;
+        let model = Model::load(&attributes.path.join("_model.json"))?;
         if model_sum(&model) != sum {
-            let text = format!("{:?}: model.json is not what was written", attributes.path);
+            let text = format!("{:?}: _model.json is not what was written", attributes.path);
             return Err(Unverified(text).into());
         }
-        let recipe = Box::new(attributes.read::<Request>("recipe")?.recipe(&model)?);
+        let recipe = Box::new(attributes.read::<RecipeSettings>("recipe")?.builder(&model).build()?);
         let (seed, count) = (attributes.read("seed")?, attributes.schema.count);
         let stream = match attributes.read::<Option<String>>("stream")? {
             Some(name) => Stream::named(seed, &name),
@@ -159,11 +159,11 @@ impl Made {
         let folder = arguments.files.as_deref().unwrap_or(beside);
         let remedy = "name the folder of the scene file with --files";
         let scene = match Scene::parse(&name, &text, folder) {
-            Ok(scene) => attributes.read::<Selection>("selection")?.of(scene)?,
+            Ok(scene) => attributes.read::<ArraySelection>("selection")?.apply(scene)?,
             Err(error) => return Ok(Err(format!("{error}; {remedy}"))),
         };
         if let Some((group, _)) =
-            scene_rows::models(&scene).iter().find(|(group, sum)| models.get(*group) != Some(sum))
+            model_sums(&scene).iter().find(|(group, sum)| models.get(*group) != Some(sum))
         {
             let what = format!("the model or the mean of {group:?} in {folder:?} is not that of the set");
             return Ok(Err(format!("{what}; {remedy}")));
@@ -172,14 +172,10 @@ impl Made {
     }
 
     /// What draws it again.
-    fn source<'a>(
-        &'a self,
-        engine: &'a Engine,
-        schema: &Schema,
-    ) -> Result<Box<dyn Source + 'a>, EngineError> {
+    fn source<'a>(&'a self, engine: &'a Engine, schema: &Schema) -> Result<Box<dyn Rows + 'a>, EngineError> {
         Ok(match self {
-            Made::Draws { recipe, draws } => Box::new(sample::Rows::new(recipe, engine, *draws)?),
-            Made::Scenes { scene, first } => Box::new(scene_rows::Rows::new(scene, engine, schema, *first)?),
+            Made::Draws { recipe, draws } => Box::new(DrawRows::new(recipe, engine, *draws)?),
+            Made::Scenes { scene, first } => Box::new(SceneRows::new(scene, engine, schema, *first)?),
         })
     }
 
@@ -211,17 +207,24 @@ impl Made {
         let engine = self.engine(arguments, schema)?;
         let mut differences = Vec::new();
         if let Made::Scenes { scene, first } = self {
-            let constants = scene_rows::Rows::new(scene, &engine, schema, *first)?.constants(schema);
+            let constants = SceneRows::new(scene, &engine, schema, *first)?.shared(&schema.shared);
             differences.extend(audit.shared_difference(constants)?);
         }
         let mut source = self.source(&engine, schema)?;
         for &chunk in chunks {
             let mut columns = vec![Vec::new(); schema.fields.len()];
-            source.draw(audit.plan().draws(chunk), &mut |window, _| {
-                check_interrupt()?;
-                columns.iter_mut().zip(window).for_each(|(column, bytes)| column.extend_from_slice(bytes));
-                Ok(())
-            })?;
+            source
+                .draw(audit.plan().draws(chunk), &mut |window, _| {
+                    if interrupt::flow().is_break() {
+                        return Err(ExportError::Interrupted);
+                    }
+                    columns
+                        .iter_mut()
+                        .zip(window)
+                        .for_each(|(column, bytes)| column.extend_from_slice(bytes));
+                    Ok(())
+                })
+                .map_err(runs::failed)?;
             differences.extend(audit.difference(chunk, &columns)?);
         }
         Ok(differences)

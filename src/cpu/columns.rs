@@ -97,7 +97,7 @@ impl<const L: usize> Take<f32, L> for Filling<'_> {
             match output.format.dtype {
                 Dtype::F16 => {
                     let (row, halves) = (&mut self.row, &mut self.halves);
-                    column.put_halves(values, &unit, done, self.kernel.interval, row, halves);
+                    column.put_halves(values, &unit, done, self.kernel.range, row, halves);
                 }
                 _ => column.put(values, &unit, done, &mut self.row),
             }
@@ -193,7 +193,7 @@ mod tests {
         let [surface, light] = ["munsell-vrhel", "granada"].map(|name| Model::builtin(name).unwrap());
         let surface = || Recipe::builder(&surface);
         let all_but = |builder: RecipeBuilder, quantity| {
-            builder.quantities(Quantity::ALL.into_iter().filter(|q| *q != quantity))
+            builder.quantities(Quantity::ALL.iter().copied().filter(|q| *q != quantity))
         };
         let lit = |builder| all_but(builder, Quantity::Intensity);
         let recipe = |builder: RecipeBuilder, max_attempts| (builder.build().unwrap(), max_attempts);
@@ -207,11 +207,16 @@ mod tests {
             recipe(lit(surface().covariance_scale(25.0)), 3),
             recipe(lit(surface().lrv(0.6)).layout(Layout::Planes), 100),
             recipe(
-                lit(surface().lrv(0.6).bounds(Bounds::Scaled)).layout(Layout::PaddedRows).half_spectra(),
+                lit(surface().lrv(0.6).bounds(Bounds::Scaled))
+                    .layout(Layout::PaddedRows)
+                    .spectra_dtype(Dtype::F16),
                 100,
             ),
-            recipe(lit(surface().lrv(0.8).bounds(Bounds::Both)).layout(Layout::Planes).half_spectra(), 2),
-            recipe(surface().half_spectra(), 100),
+            recipe(
+                lit(surface().lrv(0.8).bounds(Bounds::Both)).layout(Layout::Planes).spectra_dtype(Dtype::F16),
+                2,
+            ),
+            recipe(surface().spectra_dtype(Dtype::F16), 100),
         ]
     }
 
@@ -290,7 +295,7 @@ mod tests {
                         }
                         Dtype::F16 => {
                             let halves: &[f16] = bytemuck::cast_slice(words);
-                            let [least, largest] = kernel.interval.halves();
+                            let [least, largest] = kernel.range.halves();
                             for j in 0..format.width {
                                 let value = values[j];
                                 let kept = if value == 0.0 { 0.0 } else { value.clamp(least, largest) };

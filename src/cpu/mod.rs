@@ -40,7 +40,7 @@ pub(crate) struct Kernel<R> {
     may_exceed_one: bool,
     max_attempts: u32,
     /// What the values of spectra are between.
-    interval: ValueRange,
+    range: ValueRange,
     outputs: Vec<Output<R>>,
 }
 
@@ -150,7 +150,7 @@ impl<R: Real> Kernel<R> {
             tests_scaled: program.tests_scaled(),
             may_exceed_one: program.may_exceed_one(),
             max_attempts: program.max_attempts,
-            interval: program.interval(),
+            range: program.value_range(),
             outputs: program.outputs.iter().map(output).collect(),
         }
     }

@@ -77,7 +77,7 @@ fn hdf5(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
 #[cfg(not(feature = "hdf5"))]
 fn hdf5(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
     let reason =
-        "this build leaves out HDF5: build it with --features hdf5, or resave with save(file, '-v7')";
+        "this build leaves out HDF5: build it with the feature hdf5, or resave with save(file, '-v7')";
     Err(DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() })
 }
 

@@ -26,6 +26,7 @@ const MAX_BYTES: u64 = 512 << 20;
 
 /// What spectra describe, and so what makes one of them physical.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum SpectrumKind {
     /// Spectral power distributions of lights: positive in every band, of any magnitude.
@@ -62,7 +63,7 @@ pub enum DatasetError {
     Hdf5 { path: PathBuf, reason: String },
     #[error("{path:?} is not a readable array of NumPy's: {reason}")]
     Npy { path: PathBuf, reason: String },
-    #[error("{path:?} does not say at which wavelengths its spectra are: pass --wavelengths start:step:stop")]
+    #[error("{path:?} does not say at which wavelengths its spectra are: give them, as start:step:stop")]
     NoWavelengths { path: PathBuf },
     #[error("{path:?}, line {line}: {reason}")]
     Csv { path: PathBuf, line: u64, reason: String },
@@ -85,7 +86,7 @@ pub enum DatasetError {
     #[error("{name} holds no spectra")]
     NoSpectra { name: String },
     #[error(
-        "{name} was measured from {first} to {last} nm, which does not cover the grid {grid}: choose a grid within it, or pass --extend hold|zero"
+        "{name} was measured from {first} to {last} nm, which does not cover the grid {grid}: choose a grid within it, or extrapolate (hold or zero)"
     )]
     Range { name: String, first: f64, last: f64, grid: Grid },
 }

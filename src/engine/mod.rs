@@ -21,7 +21,7 @@ pub(crate) use schedule::{Job, Schedule};
 pub use session::Session;
 
 use crate::draw_status::DrawStatus;
-use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity};
+use crate::quantity::{ArrayFormat, Dtype, Quantity};
 use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
 use crate::sampler::SamplerError;
@@ -49,7 +49,7 @@ pub enum EngineError {
     #[error("no adapter {wanted:?}; {}", available(found))]
     NoAdapter { wanted: String, found: Vec<Adapter> },
     #[error(
-        "no graphics adapter was found: install a Vulkan driver (Debian: mesa-vulkan-drivers), or pass --engine cpu"
+        "no graphics adapter was found: install a Vulkan driver (Debian: mesa-vulkan-drivers), or draw on the CPU"
     )]
     NoAdapters,
     #[error("adapter {adapter}: {reason}")]
@@ -111,7 +111,7 @@ pub struct Batch<'a> {
     pub draws: DrawRange,
     formats: &'a [ArrayFormat],
     /// The bytes of each quantity.
-    arrays: [&'a [u8]; Quantity::ALL.len()],
+    arrays: [&'a [u8]; Quantity::COUNT],
 }
 
 /// What a range of draws took.
@@ -132,7 +132,7 @@ impl<'a> Batch<'a> {
         formats: &'a [ArrayFormat],
         arrays: impl IntoIterator<Item = &'a [u8]>,
     ) -> Batch<'a> {
-        let mut batch = Batch { draws, formats, arrays: [&[]; Quantity::ALL.len()] };
+        let mut batch = Batch { draws, formats, arrays: [&[]; Quantity::COUNT] };
         for (format, bytes) in formats.iter().zip(arrays) {
             batch.arrays[format.quantity as usize] = &bytes[..format.bytes(draws.count) as usize];
         }

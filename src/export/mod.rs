@@ -1,3 +1,60 @@
-//! From a recipe or a scene to a file or a set of chunks.
+//! From a recipe or a scene to a file, a stream or a set of chunks: what the program and other hosts write data sets
+//! with.
+//!
+//! A [`DrawExport`] or a [`SceneExport`] says what the rows of a data set are, and [`Output`] where they go. What is
+//! written depends on these two alone, and not on the engine that draws.
+//!
+//! ```
+//! use spectroll::export::{DrawExport, Output};
+//! use spectroll::{Engine, EngineChoice, Model, Recipe, Stream};
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("reflectances.npy");
+//! let recipe = Recipe::builder(&Model::builtin("munsell-vrhel")?).build()?;
+//! let engine = Engine::new(&EngineChoice::Auto)?;
+//! let export = DrawExport::new(&recipe, Stream::new(1).draws(0..1000));
+//! let summary = export.write(&engine, &Output::to(&path)?)?;
+//! assert_eq!(summary.draws, 1000);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+mod draws;
+mod output;
 pub mod provenance;
+mod scenes;
+mod writing;
+
+use std::ops::Range;
+
+pub use draws::{DrawExport, DrawRows};
+pub use output::{Destination, Output};
+pub use scenes::{ArraySelection, SceneExport, SceneRows, SelectionError, model_sums};
+pub use writing::{ExportError, Writing};
+
+use crate::engine::EngineError;
+use crate::output::{SharedArray, SpdName};
+
+/// Rows of a data set, as an engine draws them: draws, or scenes.
+pub trait Rows {
+    /// A sum that engines share exactly where they round alike.
+    fn rounding(&mut self) -> Result<String, EngineError>;
+
+    /// Draws some rows, counted from the first of the data set, and hands their columns on in order, window by window,
+    /// with the number of rows. The first error ends it.
+    fn draw(&mut self, rows: Range<u64>, window: &mut Window) -> Result<(), ExportError>;
+
+    /// The values of the arrays that all rows share, in the order of their descriptions.
+    fn shared(&self, described: &[SharedArray]) -> Vec<SharedArray>;
+}
+
+/// Takes the columns of some rows, and their number.
+pub type Window<'a> = dyn FnMut(&[&[u8]], u64) -> Result<(), ExportError> + 'a;
+
+/// What an export leaves beside its rows.
+#[derive(Clone, Debug)]
+pub struct Companions {
+    /// The names of `.spd` files, and the number of the first row among them.
+    pub(crate) spd: (SpdName, u64),
+    /// Small files that lie beside the chunks of a set, by name.
+    pub(crate) files: Vec<(&'static str, String)>,
+}

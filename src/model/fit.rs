@@ -39,7 +39,7 @@ pub enum FitError {
     )]
     Rank { components: usize, rank: usize },
     #[error(
-        "{place}: its mean power is {power}, and only a positive one can be normalised; remove it or pass --normalize none"
+        "{place}: its mean power is {power}, and only a positive one can be normalised; remove it, or fit without normalization"
     )]
     Power { place: String, power: f64 },
     #[error(

@@ -26,6 +26,7 @@ const SCHEMA: u32 = 1;
 
 /// What each spectrum was divided by before the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Normalization {
     /// Its mean power over the grid (eq. 1).

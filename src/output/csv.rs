@@ -64,14 +64,15 @@ fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
     }
     match field.axis.as_deref() {
         Some("wavelength") => wavelengths.iter().map(f64::to_string).collect(),
+        Some(_) if field.channels.len() == field.width => field.channels.clone(),
         Some(_) => (1..=field.width).map(|i| format!("{}_{i}", field.name)).collect(),
         None => vec![field.name.clone()],
     }
 }
 
 /// Adds the shortest decimal that reads back as the same value of its type.
-fn push(text: &mut String, element: Dtype, value: f64) {
-    match element {
+fn push(text: &mut String, dtype: Dtype, value: f64) {
+    match dtype {
         Dtype::F64 | Dtype::U32 => write!(text, "{value}"),
         Dtype::F32 => write!(text, "{}", value as f32),
         // Its own shortest form would be ambiguous to those who read it as anything else.

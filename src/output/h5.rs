@@ -30,7 +30,7 @@ impl Hdf5 {
                     text_attribute(&table.set, "axis", &axes.join(", "))?;
                 }
             }
-            for constant in &schema.constants {
+            for constant in &schema.shared {
                 let set = self::constant(&file, constant)?;
                 let axes: Vec<_> = constant.axes.iter().map(|(name, _)| name.as_str()).collect();
                 text_attribute(&set, "axis", &axes.join(", "))?;
@@ -69,13 +69,13 @@ pub(super) fn create(path: &Path, userblock: u64) -> Result<H5File, Hdf5Error> {
 /// Writes an array that all draws share.
 pub(super) fn constant(file: &H5File, constant: &SharedArray) -> Result<H5Dataset, Hdf5Error> {
     let shape: Vec<usize> = constant.shape().iter().map(|&n| n as usize).collect();
-    let set = match constant.element {
+    let set = match constant.dtype {
         Dtype::F32 => file.new_dataset::<f32>().shape(shape).create(&constant.name)?,
         Dtype::F64 => file.new_dataset::<f64>().shape(shape).create(&constant.name)?,
         Dtype::U32 => file.new_dataset::<u32>().shape(shape).create(&constant.name)?,
         Dtype::F16 => unreachable!("what draws share is kept as it was drawn"),
     };
-    match constant.element {
+    match constant.dtype {
         Dtype::F32 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f32>(&constant.bytes))?,
         Dtype::F64 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f64>(&constant.bytes))?,
         _ => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, u32>(&constant.bytes))?,

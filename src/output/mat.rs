@@ -46,13 +46,13 @@ impl Mat {
                     file.root_group().link("data", "X")?;
                 }
             }
-            for constant in &schema.constants {
+            for constant in &schema.shared {
                 let mut constant = constant.clone();
                 if constant.axes.len() == 1 {
                     constant.axes.push(("value".to_owned(), 1));
                 }
                 let set = h5::constant(&file, &constant)?;
-                class(&set, matlab_class(constant.element))?;
+                class(&set, matlab_class(constant.dtype))?;
             }
             let wavelengths = &schema.wavelengths;
             row(&file, "wavelength", wavelengths, &[1, wavelengths.len()])?;
@@ -83,8 +83,8 @@ impl Encoder for Mat {
     }
 }
 
-fn matlab_class(element: Dtype) -> &'static str {
-    match element {
+fn matlab_class(dtype: Dtype) -> &'static str {
+    match dtype {
         Dtype::F32 => "single",
         Dtype::F64 => "double",
         Dtype::U32 => "uint32",

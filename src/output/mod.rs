@@ -25,11 +25,13 @@ use crate::quantity::Dtype;
 
 pub use pending::{IfExists, PendingFile, write_file};
 pub use schema::{Field, Schema, SharedArray};
-pub use set::{ChunkFormat, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge};
+pub use set::{ChunkFormat, Progress, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge};
 pub use spd::{MOST_FILES, SpdFolder, SpdName};
 
 /// A format of data sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[non_exhaustive]
 pub enum FileFormat {
     /// NumPy: one array, C order.
     Npy,
@@ -38,6 +40,7 @@ pub enum FileFormat {
     /// Text: a line a draw.
     Csv,
     /// HDF5, chunked by draws.
+    #[cfg_attr(feature = "cli", value(name = "h5"))]
     Hdf5,
     /// MATLAB v7.3.
     Mat,
@@ -54,9 +57,9 @@ pub enum FileFormat {
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum OutputError {
-    #[error("{path:?}: unknown format; name it {}, or pass --format", FileFormat::EXTENSIONS)]
+    #[error("{path:?}: unknown format; name it {}, or say which format it is", FileFormat::EXTENSIONS)]
     UnknownFormat { path: PathBuf },
-    #[error("{path:?} exists already: choose another name, or pass --force to replace it")]
+    #[error("{path:?} exists already: choose another name, or replace it")]
     Exists { path: PathBuf },
     #[error("{path:?} is a folder: name a file")]
     Folder { path: PathBuf },
@@ -74,17 +77,17 @@ pub enum OutputError {
     Read { path: PathBuf, source: io::Error },
     #[error("{path:?}: {format} files hold {holds}; {remedy}")]
     Cannot { path: PathBuf, format: &'static str, holds: &'static str, remedy: &'static str },
-    #[error("{path:?}: this build leaves out {what}: build it with --features {feature}")]
+    #[error("{path:?}: this build leaves out {what}: build it with the feature {feature}")]
     NotBuilt { path: PathBuf, what: &'static str, feature: &'static str },
-    #[error("{path:?} would be a folder of {count} files: pass --force to write them nevertheless")]
-    ManyFiles { path: PathBuf, count: u64 },
     #[error(
-        "{root:?} holds an unfinished data set: pass --resume to go on with it, or --force to begin again"
+        "{path:?} would be a folder of {count} files, and folders of more than {MOST_FILES} are slow to open and to delete"
     )]
+    ManyFiles { path: PathBuf, count: u64 },
+    #[error("{root:?} holds an unfinished data set: resume it, or replace it")]
     Unfinished { path: PathBuf, root: PathBuf },
     #[error("{path:?} holds another data set: {difference}")]
     Different { path: PathBuf, difference: String },
-    #[error("{path:?} is damaged: {fault}; pass --force to make it again")]
+    #[error("{path:?} is damaged: {fault}; make it again, replacing it")]
     Damaged { path: PathBuf, fault: String },
     #[error("{}", not_a_set(path))]
     NotASet { path: PathBuf },
@@ -141,7 +144,7 @@ impl FileFormat {
             return Err(OutputError::NotBuilt { path, what, feature });
         }
         let one = schema.fields.len() == 1;
-        let shares = !schema.constants.is_empty();
+        let shares = !schema.shared.is_empty();
         let halves = schema.fields.iter().any(|field| field.stored == Dtype::F16);
         let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
         let of_scenes = schema.row == "scene";
@@ -150,23 +153,19 @@ impl FileFormat {
                 cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
             }
             FileFormat::Npy if !one && of_scenes => {
-                let remedy = "choose one with --arrays, or name it .npz, .zarr, .h5 or .parquet";
+                let remedy = "choose one, or name it .npz, .zarr, .h5 or .parquet";
                 cannot(".npy", "one array", remedy)
             }
             FileFormat::Npy if !one => {
-                let remedy = "choose one with --quantities, or name it .npz, .zarr, .h5 or .parquet";
+                let remedy = "choose one quantity, or name it .npz, .zarr, .h5 or .parquet";
                 cannot(".npy", "one array", remedy)
             }
             FileFormat::Spd if !(one && schema.fields[0].axis.as_deref() == Some("wavelength")) => {
-                let scene = "choose one group's spectra with --arrays";
-                cannot(
-                    ".spd",
-                    "spectra",
-                    if of_scenes { scene } else { "choose them with --quantities spectra" },
-                )
+                let scene = "choose the spectra of one group";
+                cannot(".spd", "spectra", if of_scenes { scene } else { "choose spectra alone" })
             }
-            FileFormat::Mat if halves => cannot(".mat", "f32 and f64", "choose one with --dtype"),
-            FileFormat::Parquet if halves => cannot(".parquet", "f32 and f64", "choose one with --dtype"),
+            FileFormat::Mat if halves => cannot(".mat", "f32 and f64", "choose one of them"),
+            FileFormat::Parquet if halves => cannot(".parquet", "f32 and f64", "choose one of them"),
             _ => Ok(()),
         }
     }
@@ -280,7 +279,7 @@ mod tests {
         let schema = |fields: &[&Field]| Schema {
             fields: fields.iter().copied().cloned().collect(),
             row: "draw".to_owned(),
-            constants: Vec::new(),
+            shared: Vec::new(),
             count: 1,
             wavelengths: vec![400.0; 31],
             attributes: serde_json::Map::new(),
@@ -293,6 +292,6 @@ mod tests {
         let halves = schema(&[&spectra.clone().stored_as(Dtype::F16)]);
         assert_eq!(error(FileFormat::Npy, &halves), "");
         #[cfg(feature = "hdf5")]
-        assert!(error(FileFormat::Mat, &halves).contains("--dtype"));
+        assert!(error(FileFormat::Mat, &halves).contains("f32 and f64"));
     }
 }

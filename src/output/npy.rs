@@ -48,8 +48,8 @@ pub(super) fn header(dtype: &str, shape: &[u64]) -> io::Result<Vec<u8>> {
 }
 
 /// What NumPy's headers call a type.
-pub(super) fn type_string(element: Dtype) -> &'static str {
-    match element {
+pub(super) fn type_string(dtype: Dtype) -> &'static str {
+    match dtype {
         Dtype::F16 => "<f2",
         Dtype::F32 => "<f4",
         Dtype::F64 => "<f8",

@@ -41,9 +41,9 @@ impl<W: Write + Seek> Npz<W> {
         }
         let wavelengths: Vec<u8> = schema.wavelengths.iter().flat_map(|w| w.to_le_bytes()).collect();
         let array = npy::file("<f8", &[schema.wavelengths.len() as u64], &wavelengths)?;
-        npz.add("wavelengths", &array, 0)?;
-        for constant in &schema.constants {
-            let dtype = npy::type_string(constant.element);
+        npz.add("wavelength", &array, 0)?;
+        for constant in &schema.shared {
+            let dtype = npy::type_string(constant.dtype);
             npz.add(&constant.name, &npy::file(dtype, &constant.shape(), &constant.bytes)?, 0)?;
         }
         let text: Vec<char> = schema.attributes_text().chars().collect();

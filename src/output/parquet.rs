@@ -39,7 +39,7 @@ pub(super) struct Parquet<W: Write + Send> {
 impl<W: Write + Send> Parquet<W> {
     pub(super) fn begin(to: W, schema: &Schema) -> io::Result<Self> {
         let wavelengths = serde_json::to_string(&schema.wavelengths).expect("numbers are JSON");
-        let notes = [("wavelengths", wavelengths), ("spectroll", schema.attributes_text())];
+        let notes = [("wavelength", wavelengths), ("spectroll", schema.attributes_text())];
         let arrow = arrow_schema(&schema.fields, &notes);
         // Readers that know Arrow look for notes in its schema, others beside it.
         let metadata = notes.into_iter().chain([("ARROW:schema", arrow)]);
@@ -141,7 +141,7 @@ fn write_values<T: DataType, const SIZE: usize>(
 /// The schema as Parquet knows it.
 fn root(fields: &[Field]) -> TypePtr {
     let fields = fields.iter().map(|field| {
-        let name = if field.is_list() { "element" } else { &field.name };
+        let name = if field.is_list() { "dtype" } else { &field.name };
         let (physical, logical) = match field.stored {
             Dtype::F32 => (Physical::FLOAT, None),
             Dtype::F64 => (Physical::DOUBLE, None),
@@ -219,18 +219,18 @@ fn arrow_field(to: &mut FlatBufferBuilder, field: &Field) -> Table {
     if !field.is_list() {
         return arrow_value(to, &field.name, field.stored);
     }
-    let value = arrow_value(to, "element", field.stored);
+    let value = arrow_value(to, "dtype", field.stored);
     let list = to.start_table();
     to.push_slot_always(entry(0), field.width as i32);
     let list = to.end_table(list);
     arrow_node(to, &field.name, FIXED_SIZE_LIST, list, &[value])
 }
 
-fn arrow_value(to: &mut FlatBufferBuilder, name: &str, element: Dtype) -> Table {
+fn arrow_value(to: &mut FlatBufferBuilder, name: &str, dtype: Dtype) -> Table {
     const INTEGER: u8 = 2;
     const FLOATING_POINT: u8 = 3;
     let table: WIPOffset<TableUnfinishedWIPOffset> = to.start_table();
-    let kind = match element {
+    let kind = match dtype {
         Dtype::U32 => {
             to.push_slot_always(entry(0), 32i32); // bits; not signed is the default
             INTEGER

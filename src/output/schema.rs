@@ -10,8 +10,8 @@ use serde_json::{Map, Value};
 use crate::quantity::{Dtype, ValueRange};
 
 /// The value that bytes hold, as f64, which holds every one of these exactly.
-fn read(element: Dtype, bytes: &[u8]) -> f64 {
-    match element {
+fn read(dtype: Dtype, bytes: &[u8]) -> f64 {
+    match dtype {
         Dtype::F16 => f16::from_le_bytes([bytes[0], bytes[1]]).to_f64(),
         Dtype::F32 => f32::from_le_bytes(bytes.try_into().expect("four bytes")).into(),
         Dtype::F64 => f64::from_le_bytes(bytes.try_into().expect("eight bytes")),
@@ -29,27 +29,40 @@ pub struct Field {
     /// What a draw has several rows of such values of, and how many, such as the surfaces of a scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outer: Option<(String, usize)>,
+    /// The names of the values along that axis, where each has one of its own, such as X, Y and Z.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub channels: Vec<String>,
     /// How many values a draw has, in all its rows.
     pub width: usize,
     /// The type of the values as they are delivered.
-    pub element: Dtype,
+    #[serde(rename = "element")]
+    pub dtype: Dtype,
     /// The type that they are written as.
     pub stored: Dtype,
     /// What they are between, and stay between when they are rounded; `None` where that is not known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub interval: Option<ValueRange>,
+    #[serde(default, rename = "interval", skip_serializing_if = "Option::is_none")]
+    pub range: Option<ValueRange>,
 }
 
 impl Field {
     /// A quantity of `width` values a draw, over `axis`.
-    pub fn vector(name: &str, axis: &str, width: usize, element: Dtype) -> Field {
-        Field { width, axis: Some(axis.to_owned()), ..Field::scalar(name, element) }
+    pub fn vector(name: &str, axis: &str, width: usize, dtype: Dtype) -> Field {
+        Field { width, axis: Some(axis.to_owned()), ..Field::scalar(name, dtype) }
     }
 
     /// A quantity of one value a draw.
-    pub fn scalar(name: &str, element: Dtype) -> Field {
+    pub fn scalar(name: &str, dtype: Dtype) -> Field {
         let name = name.to_owned();
-        Field { name, axis: None, outer: None, width: 1, element, stored: element, interval: None }
+        Field {
+            name,
+            axis: None,
+            outer: None,
+            channels: Vec::new(),
+            width: 1,
+            dtype,
+            stored: dtype,
+            range: None,
+        }
     }
 
     /// The same for `count` rows a draw.
@@ -59,20 +72,25 @@ impl Field {
 
     /// The same, written as another type of float where it is one.
     pub fn stored_as(mut self, stored: Dtype) -> Field {
-        if self.element != Dtype::U32 {
+        if self.dtype != Dtype::U32 {
             self.stored = stored;
         }
         self
     }
 
-    /// The same, with values in an interval.
-    pub fn within(self, interval: ValueRange) -> Field {
-        Field { interval: Some(interval), ..self }
+    /// The same, with a name for each value along its axis.
+    pub fn with_channels(self, names: &[&str]) -> Field {
+        Field { channels: names.iter().map(|name| (*name).to_owned()).collect(), ..self }
+    }
+
+    /// The same, with values in an range.
+    pub fn within(self, range: ValueRange) -> Field {
+        Field { range: Some(range), ..self }
     }
 
     /// The bytes of one draw as delivered.
     pub fn delivered_bytes(&self) -> usize {
-        self.width * self.element.size()
+        self.width * self.dtype.size()
     }
 
     /// The bytes of one draw as written.
@@ -101,12 +119,12 @@ impl Field {
 
     /// Values as delivered, as they are to be written. An error says what does not fit the type.
     pub(super) fn store<'a>(&self, bytes: &'a [u8]) -> io::Result<Cow<'a, [u8]>> {
-        if self.element == self.stored {
+        if self.dtype == self.stored {
             return Ok(Cow::Borrowed(bytes));
         }
-        let values = bytes.chunks_exact(self.element.size());
+        let values = bytes.chunks_exact(self.dtype.size());
         let mut out = Vec::with_capacity(values.len() * self.stored.size());
-        match (self.element, self.stored) {
+        match (self.dtype, self.stored) {
             (from, Dtype::F16) => {
                 for value in values.map(|v| read(from, v)) {
                     out.extend_from_slice(&self.half(value)?.to_le_bytes());
@@ -122,7 +140,7 @@ impl Field {
     }
 
     fn half(&self, value: f64) -> io::Result<f16> {
-        let [least, largest] = self.interval.map_or([f32::NEG_INFINITY, f32::INFINITY], ValueRange::halves);
+        let [least, largest] = self.range.map_or([f32::NEG_INFINITY, f32::INFINITY], ValueRange::halves);
         let half = f16::from_f64(value.clamp(least.into(), largest.into()));
         if half.is_infinite() && value.is_finite() {
             let (name, most) = (&self.name, f16::MAX);
@@ -134,8 +152,8 @@ impl Field {
 
     /// The values of delivered bytes.
     pub(super) fn values<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = f64> + use<'a> {
-        let element = self.element;
-        bytes.chunks_exact(element.size()).map(move |value| read(element, value))
+        let dtype = self.dtype;
+        bytes.chunks_exact(dtype.size()).map(move |value| read(dtype, value))
     }
 }
 
@@ -147,7 +165,8 @@ pub struct SharedArray {
     /// Its dimensions: their names and extents.
     pub axes: Vec<(String, u64)>,
     /// The type of its values.
-    pub element: Dtype,
+    #[serde(rename = "element")]
+    pub dtype: Dtype,
     /// Its values in C order. A set of chunks has them in a file of their own.
     #[serde(skip)]
     pub bytes: Vec<u8>,
@@ -156,7 +175,7 @@ pub struct SharedArray {
 /// Ignores the values, which a manifest does not hold: those of one description are the same.
 impl PartialEq for SharedArray {
     fn eq(&self, other: &SharedArray) -> bool {
-        (&self.name, &self.axes, self.element) == (&other.name, &other.axes, other.element)
+        (&self.name, &self.axes, self.dtype) == (&other.name, &other.axes, other.dtype)
     }
 }
 
@@ -176,8 +195,8 @@ pub struct Schema {
     #[serde(default = "draw")]
     pub row: String,
     /// Arrays that all draws share.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub constants: Vec<SharedArray>,
+    #[serde(default, rename = "constants", skip_serializing_if = "Vec::is_empty")]
+    pub shared: Vec<SharedArray>,
     /// How many draws there are.
     pub count: u64,
     /// The wavelengths that the axis `wavelength` stands for, nm.

@@ -83,7 +83,7 @@ impl SpdFolder {
             unreachable!("the schema has one field: see Format::check")
         };
         // A scene has several spectra of a group: each has a file of its own.
-        for spectrum in column.chunks_exact(self.schema.wavelengths.len() * field.element.size()) {
+        for spectrum in column.chunks_exact(self.schema.wavelengths.len() * field.dtype.size()) {
             let mut text = String::new();
             for (wavelength, value) in self.schema.wavelengths.iter().zip(field.values(spectrum)) {
                 writeln!(text, "{wavelength} {}", decimal(value)).expect("a string takes it all");

@@ -136,7 +136,7 @@ impl Program {
     }
 
     /// What the values of spectra that come out are between.
-    pub(crate) fn interval(&self) -> ValueRange {
+    pub(crate) fn value_range(&self) -> ValueRange {
         match self.kind {
             SpectrumKind::Reflectance if !self.may_exceed_one() => ValueRange::Unit,
             _ => ValueRange::Positive,

@@ -3,10 +3,14 @@
 use std::collections::HashMap;
 use std::iter;
 
+use serde::{Deserialize, Serialize};
+
 use crate::affine::Affine;
 
 /// What must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum Bounds {
     /// The spectrum before scaling, as in the appendix. Scaled values can then exceed 1; draws that do are counted.
     #[default]

@@ -2,7 +2,10 @@
 
 use super::outputs::{OutputRequest, outputs};
 use super::pilot::{TOLERABLE_FAILURE, failure, pilot};
-use super::{DEFAULT_MAX_ATTEMPTS, Intensity, ProposalKind, Recipe, RecipeError, XyzScale};
+use super::{
+    CoverSize, DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, ProposalKind, Recipe, RecipeError,
+    RecipeSettings, XyzScale,
+};
 use crate::affine::Affine;
 use crate::colorimetry;
 use crate::cover::Cover;
@@ -13,7 +16,6 @@ use crate::program::condition::Condition;
 use crate::program::feasibility::{self, Room};
 use crate::program::{self, Bounds, IntensityLaw, LrvTarget, Program};
 use crate::quantity::{Dtype, Layout, Quantity};
-use crate::random::stream::Stream;
 
 /// A recipe under construction.
 #[derive(Clone, Debug)]
@@ -57,24 +59,24 @@ impl RecipeBuilder {
         self
     }
 
-    /// Spectra in 16 bits, rounded to nearest and ties to even, but never to an end of their [`ValueRange`]; above 65,504
-    /// they are infinite. Other quantities stay in 32 bits.
+    /// The type of the spectra ([`Dtype::F32`]). In [`Dtype::F16`] they are rounded to nearest and ties to even, but never
+    /// to an end of their [`ValueRange`]; above 65,504 they are infinite. Other quantities stay in 32 bits.
     ///
-    /// [`ValueRange`]: crate::Interval
-    pub fn half_spectra(mut self) -> Self {
-        self.outputs.spectra = Dtype::F16;
+    /// [`ValueRange`]: crate::ValueRange
+    pub fn spectra_dtype(mut self, dtype: Dtype) -> Self {
+        self.outputs.spectra = dtype;
         self
     }
 
-    /// The illuminant under which reflectances have their XYZ and sRGB (D65): its power in each band, in any unit.
-    pub fn light(mut self, power: &[f64]) -> Self {
-        self.outputs.light = Some(power.to_vec());
+    /// The illuminant under which reflectances have their XYZ and linear sRGB ([`Illuminant::D65`]).
+    pub fn illuminant(mut self, illuminant: Illuminant) -> Self {
+        self.outputs.illuminant = Some(illuminant);
         self
     }
 
-    /// The scale of an illuminant's XYZ and sRGB ([`XyzScale::Absolute`]).
-    pub fn luminance(mut self, luminance: XyzScale) -> Self {
-        self.outputs.luminance = Some(luminance);
+    /// The scale of an illuminant's XYZ and linear sRGB ([`XyzScale::Absolute`]).
+    pub fn xyz_scale(mut self, scale: XyzScale) -> Self {
+        self.outputs.xyz_scale = Some(scale);
         self
     }
 
@@ -139,6 +141,21 @@ impl RecipeBuilder {
         Ok(recipe)
     }
 
+    fn settings(&self) -> RecipeSettings {
+        RecipeSettings {
+            lrv: self.lrv,
+            xyz: self.xyz,
+            bounds: self.bounds.unwrap_or_default(),
+            covariance_scale: self.covariance_scale,
+            intensity: self.intensity,
+            quantities: self.outputs.quantities.clone(),
+            illuminant: self.outputs.illuminant.clone().unwrap_or_default(),
+            xyz_scale: self.outputs.xyz_scale.unwrap_or_default(),
+            proposal: self.proposal,
+            max_attempts: self.max_attempts,
+        }
+    }
+
     /// The program of plain rejection.
     fn program(&self) -> Result<Program, RecipeError> {
         if !(self.covariance_scale.is_finite() && self.covariance_scale >= 0.0) {
@@ -199,6 +216,7 @@ impl RecipeBuilder {
         half_spaces: &[HalfSpace],
         centre: Option<Vec<f64>>,
     ) -> Result<Recipe, RecipeError> {
+        let settings = self.settings();
         let (may_be_plain, may_be_covered) = match self.proposal {
             ProposalKind::Auto => (true, true),
             ProposalKind::Plain => (true, false),
@@ -213,13 +231,27 @@ impl RecipeBuilder {
             let acceptance = pilot(&covered);
             if Cover::pays(acceptance, plain) {
                 let probability = acceptance * cover.mass();
-                let cover = Some((cover.len(), cover.proposal().bytes()));
-                return Ok(Recipe { model: self.model, program: covered, probability, acceptance, cover });
+                let cover = Some(CoverSize { boxes: cover.len(), bytes: cover.proposal().bytes() });
+                return Ok(Recipe {
+                    settings,
+                    model: self.model,
+                    program: covered,
+                    probability,
+                    acceptance,
+                    cover,
+                });
             }
         } else if !may_be_plain {
             return Err(RecipeError::NoCover { components: program.components() });
         }
-        Ok(Recipe { model: self.model, program, probability: plain, acceptance: plain, cover: None })
+        Ok(Recipe {
+            settings,
+            model: self.model,
+            program,
+            probability: plain,
+            acceptance: plain,
+            cover: None,
+        })
     }
 
     /// What giving the tristimulus values does to this model.

@@ -6,10 +6,14 @@ mod error;
 mod outputs;
 mod pilot;
 mod scalar;
+mod settings;
 
 pub use builder::RecipeBuilder;
 pub use error::RecipeError;
 pub use scalar::{Draw, ScalarSampler};
+pub use settings::RecipeSettings;
+
+use serde::{Deserialize, Serialize};
 
 use crate::colorimetry;
 use crate::dataset::SpectrumKind;
@@ -27,15 +31,28 @@ pub const DEFAULT_MAX_ATTEMPTS: u32 = 1 << 16;
 #[derive(Clone, Debug)]
 pub struct Recipe {
     model: Model,
+    settings: RecipeSettings,
     program: Program,
     probability: f64,
     acceptance: f64,
-    /// How many boxes candidates are proposed from, and how many bytes their table has; `None` of plain rejection.
-    cover: Option<(usize, usize)>,
+    /// The size of the cover that candidates are proposed from; `None` of plain rejection.
+    cover: Option<CoverSize>,
+}
+
+/// The size of a cover.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct CoverSize {
+    /// The number of boxes.
+    pub boxes: usize,
+    /// The size of their table in bytes.
+    pub bytes: usize,
 }
 
 /// Where candidates come from. The draws have the same distribution either way, but are not the same draws.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum ProposalKind {
     /// Whatever is expected to cost less.
     #[default]
@@ -47,7 +64,8 @@ pub enum ProposalKind {
 }
 
 /// What an illuminant is multiplied by.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Intensity {
     /// This.
     Fixed(f64),
@@ -58,8 +76,25 @@ pub enum Intensity {
     Data,
 }
 
+/// The illuminant that reflectances have their XYZ and linear sRGB under.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Illuminant {
+    /// CIE standard illuminant D65: noon daylight.
+    #[default]
+    D65,
+    /// CIE standard illuminant A: incandescent light.
+    A,
+    /// The equal-energy illuminant.
+    E,
+    /// The power in each band, in any unit.
+    Power(Vec<f64>),
+}
+
 /// The scale of an illuminant's tristimulus values.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "kebab-case")]
 pub enum XyzScale {
     /// Sums of power x colour matching function x step in nm, without the 683 lm/W of luminous units.
     #[default]
@@ -96,6 +131,11 @@ impl Recipe {
         &self.model
     }
 
+    /// The settings that it was built from.
+    pub fn settings(&self) -> &RecipeSettings {
+        &self.settings
+    }
+
     /// The share of candidates that are accepted, estimated from 65,536 of them.
     pub fn acceptance(&self) -> f64 {
         self.acceptance
@@ -112,14 +152,14 @@ impl Recipe {
         if self.cover.is_some() { ProposalKind::Cover } else { ProposalKind::Plain }
     }
 
-    /// How many boxes candidates are proposed from, and how many bytes their table has, where there is a cover.
-    pub fn cover(&self) -> Option<(usize, usize)> {
+    /// The size of the cover that candidates are proposed from; `None` of plain rejection.
+    pub fn cover(&self) -> Option<CoverSize> {
         self.cover
     }
 
     /// What the values of its spectra are between.
-    pub fn interval(&self) -> ValueRange {
-        self.program.interval()
+    pub fn value_range(&self) -> ValueRange {
+        self.program.value_range()
     }
 
     /// What comes out, and how it lies in memory, in the order of [`Quantity`](crate::Quantity).
@@ -197,7 +237,7 @@ mod tests {
             (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
             (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
             (surface.clone().bounds(Bounds::Both), "without a target luminous reflectance"),
-            (surface.clone().illuminant(&[1.0; 31]), "without XYZ or sRGB of reflectances"),
+            (surface.clone().illuminant(Illuminant::E), "without XYZ or linear sRGB of reflectances"),
             (surface.clone().xyz_scale(XyzScale::UnitY).quantities([Quantity::Xyz]), "of illuminants"),
         ] {
             let text = message(recipe);

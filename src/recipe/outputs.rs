@@ -1,12 +1,12 @@
 //! From the quantities that a recipe asks for to what computes them: each as a map of the normals, folded in f64.
 
+use super::{Illuminant, RecipeError, XyzScale};
 use crate::affine::Affine;
 use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::model::Model;
 use crate::program::{Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity};
-use crate::recipe::{RecipeError, XyzScale};
 
 /// What a recipe asks for.
 #[derive(Clone, Debug)]
@@ -16,8 +16,8 @@ pub(crate) struct OutputRequest {
     /// The type of spectra.
     pub(crate) spectra: Dtype,
     /// The illuminant of reflectances, if it is not D65.
-    pub(crate) light: Option<Vec<f64>>,
-    pub(crate) luminance: Option<XyzScale>,
+    pub(crate) illuminant: Option<Illuminant>,
+    pub(crate) xyz_scale: Option<XyzScale>,
     /// The intensity of every draw, where it is the same.
     pub(crate) fixed: Option<f64>,
 }
@@ -28,8 +28,8 @@ impl Default for OutputRequest {
             quantities: vec![Quantity::Spectra],
             layout: Layout::default(),
             spectra: Dtype::F32,
-            light: None,
-            luminance: None,
+            illuminant: None,
+            xyz_scale: None,
             fixed: None,
         }
     }
@@ -49,12 +49,12 @@ pub(crate) fn outputs(
         return Err(RecipeError::Nothing);
     }
     let has_colours = quantities.iter().any(|q| matches!(q, Quantity::Xyz | Quantity::LinearSrgb));
-    if asked.light.is_some() && !(has_colours && model.kind() == SpectrumKind::Reflectance) {
-        let (setting, needs) = ("an illuminant to see surfaces under", "XYZ or sRGB of reflectances");
+    if asked.illuminant.is_some() && !(has_colours && model.kind() == SpectrumKind::Reflectance) {
+        let (setting, needs) = ("an illuminant to see surfaces under", "XYZ or linear sRGB of reflectances");
         return Err(RecipeError::Pointless { setting, needs });
     }
-    if asked.luminance.is_some() && !(has_colours && model.kind() == SpectrumKind::Illuminant) {
-        let (setting, needs) = ("a scale of tristimulus values", "XYZ or sRGB of illuminants");
+    if asked.xyz_scale.is_some() && !(has_colours && model.kind() == SpectrumKind::Illuminant) {
+        let (setting, needs) = ("a scale of tristimulus values", "XYZ or linear sRGB of illuminants");
         return Err(RecipeError::Pointless { setting, needs });
     }
     let output = |quantity| {
@@ -93,7 +93,7 @@ fn source(
         Quantity::Weights => Source::Map(weights.clone(), Unit::One),
         Quantity::Xyz | Quantity::LinearSrgb => {
             let xyz = program.spectrum.project(&xyz_weights(asked, model)?);
-            let unit = match (model.kind(), asked.luminance.unwrap_or_default()) {
+            let unit = match (model.kind(), asked.xyz_scale.unwrap_or_default()) {
                 (SpectrumKind::Illuminant, XyzScale::UnitY) => Unit::Over(xyz.value(1)),
                 _ => scaled,
             };
@@ -126,14 +126,17 @@ fn xyz_weights(asked: &OutputRequest, model: &Model) -> Result<[Vec<f64>; 3], Re
     if model.kind() == SpectrumKind::Illuminant {
         return Ok(colorimetry::cmf(grid).map(|f| f.iter().map(|v| v * grid.step()).collect()));
     }
-    let Some(light) = &asked.light else {
-        return colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid));
+    let power = match asked.illuminant.as_ref().unwrap_or(&Illuminant::D65) {
+        Illuminant::D65 => return colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid)),
+        Illuminant::A => colorimetry::illuminant_a(grid),
+        Illuminant::E => vec![1.0; grid.len()],
+        Illuminant::Power(power) => power.clone(),
     };
-    if light.len() != grid.len() {
-        return Err(RecipeError::Light { found: light.len(), expected: grid.len() });
+    if power.len() != grid.len() {
+        return Err(RecipeError::Light { found: power.len(), expected: grid.len() });
     }
-    if !light.iter().all(|power| power.is_finite() && *power >= 0.0) {
+    if !power.iter().all(|power| power.is_finite() && *power >= 0.0) {
         return Err(RecipeError::DarkLight);
     }
-    colorimetry::xyz_weights_under(light, grid).ok_or(RecipeError::DarkLight)
+    colorimetry::xyz_weights_under(&power, grid).ok_or(RecipeError::DarkLight)
 }

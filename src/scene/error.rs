@@ -44,7 +44,7 @@ pub enum SceneErrorKind {
     #[error("this is {found}, and it takes {expected}")]
     Type { expected: &'static str, found: String },
     #[error("there is no {found:?}{}; there are {known}", meant(suggestion))]
-    EngineChoice { found: String, suggestion: Option<String>, known: String },
+    Choice { found: String, suggestion: Option<String>, known: String },
     #[error("{with:?} says the same in another way: keep one of the two")]
     Both { with: &'static str },
     #[error("it means nothing {with}: leave it out")]
@@ -72,7 +72,7 @@ pub enum SceneErrorKind {
     #[error(transparent)]
     Model(ModelError),
     #[error("this model is of {found}s, and the group is of {wanted}s: choose another model")]
-    SpectrumKind { found: SpectrumKind, wanted: SpectrumKind },
+    Kind { found: SpectrumKind, wanted: SpectrumKind },
     #[error("the model is on {model} nm, and the scene on {scene} nm: {}", same_grid(*model))]
     Grid { model: Grid, scene: Grid },
     #[error(transparent)]
@@ -88,7 +88,7 @@ pub enum SceneErrorKind {
     #[error("{0}: every level must be above 0 and below 1, where 1 is a perfect white")]
     Level(f64),
     #[error("{0} levels: it takes 1 to 10000")]
-    LrvLevels(u64),
+    Levels(u64),
     #[error("from {from} to {to}: the first must be below the second")]
     Order { from: f64, to: f64 },
     #[error("{from} to {to}: {what} is between 0 and 1, and the first no more than the second")]
@@ -176,13 +176,6 @@ fn builtin() -> String {
 fn same_grid(model: Grid) -> String {
     format!(
         "set wavelengths = \"{model}\", or name a model on the scene's (some built-in ones end in -5nm; \
-         `spectroll fit --wavelengths` makes others)"
+         others can be fitted)"
     )
-}
-
-/// The one of `known` that was probably meant.
-pub(super) fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    let distance = |name: &&str| strsim::osa_distance(&found.to_ascii_lowercase(), name);
-    let close = known.into_iter().filter(|name| distance(name) <= 1 + name.len() / 4);
-    close.min_by_key(distance).map(str::to_owned)
 }

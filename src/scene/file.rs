@@ -14,12 +14,13 @@ use crate::model::Model;
 use crate::program::Bounds;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
 
-use super::error::{SceneError, SceneErrorKind, SceneErrorPlace, closest};
+use super::error::{SceneError, SceneErrorKind, SceneErrorPlace};
 use super::group::{
     Base, Copies, Group, Hue, Illuminants, IntensityScope, LrvLevels, Surfaces, TargetConstraint, Targets,
 };
 use super::reader::{Entry, Section, Wrong};
 use super::{Scene, SceneBuilder};
+use crate::suggestion::closest;
 
 /// The scene files that are built in, by name: the conditions of Singh et al. (2018).
 pub const PRESETS: [(&str, &str); 3] = [
@@ -306,7 +307,7 @@ fn levels(entry: &Entry) -> Result<LrvLevels, Wrong> {
     let count = section.need("levels", "{ from = 0.2, to = 0.6, levels = 10 }")?;
     let levels = count.whole()?;
     if !(1..=10_000).contains(&levels) {
-        return Err(count.wrong(SceneErrorKind::LrvLevels(levels)));
+        return Err(count.wrong(SceneErrorKind::Levels(levels)));
     }
     if levels > 1 && from >= to {
         return Err(entry.wrong(SceneErrorKind::Order { from, to }));

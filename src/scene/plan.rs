@@ -6,7 +6,7 @@ use crate::dataset::SpectrumKind;
 use crate::grid::Grid;
 use crate::model::{Model, ModelParts};
 use crate::program::{Bounds, IntensityLaw};
-use crate::quantity::{Quantity, ValueRange};
+use crate::quantity::{Dtype, Quantity, ValueRange};
 use crate::random::stream::{self, Stream};
 use crate::recipe::{Intensity, Recipe, RecipeBuilder, RecipeError};
 
@@ -72,6 +72,9 @@ pub struct Array {
     /// The group that it belongs to.
     #[serde(skip)]
     pub group: String,
+    /// The kind of its group.
+    #[serde(skip)]
+    pub kind: GroupKind,
     /// The quantity that it holds: f32, or u32 where it counts attempts.
     pub quantity: Quantity,
     /// Whether it has an entry for each scene, rather than one for all.
@@ -80,7 +83,7 @@ pub struct Array {
     pub shape: Vec<usize>,
     /// What its values are between, if they are spectra.
     #[serde(skip)]
-    pub interval: Option<ValueRange>,
+    pub range: Option<ValueRange>,
 }
 
 /// The name of a group's array: that of the group, with an underscore and the name of the quantity unless that is
@@ -96,6 +99,11 @@ impl Array {
     /// How many values an entry has.
     pub fn values(&self) -> usize {
         self.shape.iter().product()
+    }
+
+    /// The type of its values.
+    pub fn dtype(&self) -> Dtype {
+        if self.quantity == Quantity::Attempts { Dtype::U32 } else { Dtype::F32 }
     }
 
     /// How many bytes an entry has: every value has 4.
@@ -173,7 +181,7 @@ fn of_kind(base: &Base, wanted: SpectrumKind) -> Result<&Model, (&'static str, S
     let model = base.model.as_ref().expect("only flat targets have none");
     match model.kind() {
         found if found == wanted => Ok(model),
-        found => Err(("model", SceneErrorKind::SpectrumKind { found, wanted })),
+        found => Err(("model", SceneErrorKind::Kind { found, wanted })),
     }
 }
 
@@ -225,7 +233,12 @@ fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: us
     let base = group.base();
     let count = base.count as usize;
     let once = matches!(shapes, Shapes::Once(_));
-    let interval = match group {
+    let kind = match group {
+        Group::Illuminants(_) => GroupKind::Illuminant,
+        Group::Surfaces(_) => GroupKind::Surface,
+        Group::Targets(_) => GroupKind::Target,
+    };
+    let range = match group {
         Group::Illuminants(_) => ValueRange::Positive,
         Group::Surfaces(_) => ValueRange::Unit,
         Group::Targets(Targets { aim: TargetConstraint::Lrv(_), bounds: Bounds::Base, .. }) => {
@@ -236,10 +249,11 @@ fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: us
     let array = |quantity: Quantity, per_scene, shape: &[usize]| Array {
         name: array_name(&base.name, quantity),
         group: base.name.clone(),
+        kind,
         quantity,
         per_scene,
         shape: shape.to_vec(),
-        interval: (quantity == Quantity::Spectra).then_some(interval),
+        range: (quantity == Quantity::Spectra).then_some(range),
     };
     let mut arrays = vec![array(Quantity::Spectra, !once || intensity.is_some(), &[count, bands])];
     match intensity.map(|intensity| intensity.scope) {

@@ -8,7 +8,8 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{SceneErrorKind, closest};
+use super::error::SceneErrorKind;
+use crate::suggestion::closest;
 
 /// Something wrong with a key.
 #[derive(Debug)]
@@ -152,7 +153,7 @@ impl<'a> Entry<'a> {
         let text = self.text()?;
         let names = || known.iter().map(|(name, _)| *name);
         known.iter().find(|(name, _)| *name == text).map(|(_, value)| *value).ok_or_else(|| {
-            self.wrong(SceneErrorKind::EngineChoice {
+            self.wrong(SceneErrorKind::Choice {
                 found: text.to_owned(),
                 suggestion: closest(text, names()),
                 known: names().collect::<Vec<_>>().join(", "),

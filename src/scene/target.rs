@@ -226,13 +226,13 @@ fn check(targets: &Targets) -> Result<(), (&'static str, SceneErrorKind)> {
     if let Some(model) = targets.base.model.as_ref().filter(|model| model.kind() == SpectrumKind::Illuminant)
     {
         let (found, wanted) = (model.kind(), SpectrumKind::Reflectance);
-        return Err(("model", SceneErrorKind::SpectrumKind { found, wanted }));
+        return Err(("model", SceneErrorKind::Kind { found, wanted }));
     }
     match &targets.aim {
         TargetConstraint::Lrv(levels) | TargetConstraint::Flat(levels) => match levels {
             LrvLevels::Each(levels) => {
                 if !(1..=10_000).contains(&levels.len()) {
-                    return Err(("lrv", SceneErrorKind::LrvLevels(levels.len() as u64)));
+                    return Err(("lrv", SceneErrorKind::Levels(levels.len() as u64)));
                 }
                 levels.iter().try_for_each(|&value| level(value))?;
             }
@@ -251,7 +251,7 @@ fn check(targets: &Targets) -> Result<(), (&'static str, SceneErrorKind)> {
         },
         TargetConstraint::Hue(hue) => {
             if !(1..=10_000).contains(&hue.levels) {
-                return Err(("hue", SceneErrorKind::LrvLevels(hue.levels.into())));
+                return Err(("hue", SceneErrorKind::Levels(hue.levels.into())));
             }
             for (what, (from, to)) in [("saturation", hue.saturation), ("lightness", hue.lightness)] {
                 if !(from >= 0.0 && from <= to && to <= 1.0) {

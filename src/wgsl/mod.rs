@@ -38,7 +38,7 @@ pub(crate) const TABLES_AT: u32 = 1;
 pub(crate) const OUTPUTS_AT: u32 = 2;
 
 /// The binding of a cover's boxes.
-pub(crate) const COVER_AT: u32 = OUTPUTS_AT + Quantity::ALL.len() as u32;
+pub(crate) const COVER_AT: u32 = OUTPUTS_AT + Quantity::COUNT as u32;
 
 /// The most gains (bands x components) that are written out as constants. At this size lavapipe takes 2.5 s to
 /// compile the straight lines, which then run 7 times as fast as the loop: they pay from 2e5 draws on.
@@ -179,7 +179,7 @@ mod tests {
                 .collect(),
         };
         let outputs = vec![Output { format: ArrayFormat::spectra(bands), source: Source::Spectrum }];
-        let target = target.map(|(lrv, bounds)| program::Dialect { lrv, weights, bounds });
+        let target = target.map(|(lrv, bounds)| program::LrvTarget { lrv, weights, bounds });
         Program { kind, spectrum, target, intensity: None, proposal: None, max_attempts: 100, outputs }
             .with_status()
     }
@@ -192,7 +192,7 @@ mod tests {
         weights.gain[0][0] = 0.5;
         let xyz = program.spectrum.project(&[vec![0.5; n], vec![0.25; n], vec![0.125; n]]);
         let map = |quantity, map: Affine, unit| {
-            let format = ArrayFormat { quantity, element: Dtype::F32, width: map.offset.len(), layout };
+            let format = ArrayFormat { quantity, dtype: Dtype::F32, width: map.offset.len(), layout };
             Output { format, source: Source::Map(map, unit) }
         };
         let over = match program.kind {
@@ -201,7 +201,7 @@ mod tests {
         };
         let mut outputs = vec![
             Output {
-                format: ArrayFormat { element: spectra, layout, ..ArrayFormat::spectra(n) },
+                format: ArrayFormat { dtype: spectra, layout, ..ArrayFormat::spectra(n) },
                 source: Source::Spectrum,
             },
             map(Quantity::Weights, weights, Unit::One),
@@ -211,7 +211,7 @@ mod tests {
         ];
         if program.intensity.is_some() {
             let format =
-                ArrayFormat { quantity: Quantity::Intensity, element: Dtype::F32, ..ArrayFormat::status() };
+                ArrayFormat { quantity: Quantity::Intensity, dtype: Dtype::F32, ..ArrayFormat::status() };
             outputs.push(Output { format, source: Source::Intensity });
         }
         Program { outputs, ..program }
@@ -242,7 +242,7 @@ mod tests {
             for level in
                 [IntensityLaw::LogUniform { low: 0.5, octaves: 10.0 }, IntensityLaw::OneOf(vec![1.0, 2.0])]
             {
-                programs.push(Program { level: Some(level), ..of(SpectrumKind::Illuminant, None) });
+                programs.push(Program { intensity: Some(level), ..of(SpectrumKind::Illuminant, None) });
             }
             programs.extend(rules.map(|rule| of(SpectrumKind::Reflectance, rule)));
         }
@@ -300,8 +300,8 @@ mod tests {
         let surface = |target| small(SpectrumKind::Reflectance, target);
         let lrv = |bounds| surface(Some((0.4, bounds)));
         let level = IntensityLaw::LogUniform { low: 0.15, octaves: 10.0 };
-        let lamp = || Program { level: Some(level.clone()), ..illuminant() };
-        let lamps = || Program { level: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..illuminant() };
+        let lamp = || Program { intensity: Some(level.clone()), ..light() };
+        let lamps = || Program { intensity: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..light() };
         let generated = |program: &Program, target| {
             let tables = Tables::new(program);
             arithmetic(program, &tables) + &store(program, &tables, target)

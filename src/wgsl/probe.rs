@@ -157,7 +157,7 @@ fn truncated_normals_are_those_of_their_twin() {
     let cases: Vec<_> = words.iter().step_by(7).zip(axes.iter().cycle()).collect();
     let input: Vec<u32> =
         cases.iter().flat_map(|(word, axis)| std::iter::once(**word).chain(axis.iter().copied())).collect();
-    let fragments = include_str!("../shaders/truncated.wgsl");
+    let fragments = include_str!("../../shaders/truncated.wgsl");
     let allowed = allowed_ulps();
     for (element, name) in ["x", "y"].into_iter().enumerate() {
         let body = format!(

@@ -144,7 +144,7 @@ impl Store<'_> {
             Source::Status => return format!("{d}.attempts"),
         };
         let value = match (&output.source, output.format.dtype) {
-            (Source::Spectrum, Dtype::F16) => within(value, self.program.interval()),
+            (Source::Spectrum, Dtype::F16) => within(value, self.program.value_range()),
             _ => value,
         };
         format!("select(0f, {value}, ok_{d})")

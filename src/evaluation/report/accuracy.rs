@@ -117,7 +117,7 @@ struct Judge<'a> {
 
 /// The spectra of draws on the CPU, and what each took.
 fn scalar_draws<R: Real>(recipe: &Recipe, draws: DrawRange) -> Vec<(Vec<R>, DrawStatus)> {
-    let session = recipe.scalar::<R>();
+    let session = recipe.scalar_sampler::<R>();
     let draw = |i| {
         let drawn = session.draw(draws.stream, draws.first + i);
         (drawn.spectrum().to_vec(), drawn.status())
@@ -322,7 +322,7 @@ mod tests {
     fn coarse_uniforms_err_more_than_ours() {
         let recipe = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap()).build().unwrap();
         let judge = Judge::new(&recipe, Stream::new(1).draws(0..10_000));
-        let [ours, coarse] = [judge.scalar::<f32>(), judge.scalar_sampler::<Coarse>()]
+        let [ours, coarse] = [judge.scalar::<f32>(), judge.scalar::<Coarse>()]
             .map(|(values, statuses)| judge.variant("", &values, &statuses).spectra.max);
         assert!(ours < 1e-6 && coarse > 2.0 * ours, "{ours:e} {coarse:e}");
     }

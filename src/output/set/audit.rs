@@ -45,7 +45,7 @@ impl SetAudit {
     /// has its sums.
     pub fn shared_difference(&self, constants: Vec<SharedArray>) -> Result<Option<String>, OutputError> {
         let mut plan = self.manifest.plan.clone();
-        plan.schema.constants = constants;
+        plan.schema.shared = constants;
         let failed = |source| OutputError::Write { path: self.root.clone(), source };
         let parts = plan.layout.constants(&plan).map_err(failed)?;
         let differs =

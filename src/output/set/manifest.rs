@@ -17,7 +17,7 @@ use super::super::{OutputError, Schema};
 use super::{ChunkFormat, Part};
 
 /// The manifest of a whole set.
-pub(super) const SEALED: &str = "manifest.json";
+pub(super) const SEALED: &str = "_manifest.json";
 
 /// The version of the manifest that this program writes and reads.
 const VERSION: u32 = 1;
@@ -159,7 +159,7 @@ impl Manifest {
 
 /// The name of the manifest of one of several processes, both counted from 1.
 pub(super) fn part_name(index: u64, count: u64) -> String {
-    format!("manifest.{index}-of-{count}.json")
+    format!("_manifest.{index}-of-{count}.json")
 }
 
 /// The manifests in a folder, of processes and of the whole.
@@ -168,7 +168,7 @@ pub(super) fn manifests(root: &Path) -> io::Result<Vec<std::path::PathBuf>> {
     for entry in fs::read_dir(root)? {
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        if name == SEALED || (name.starts_with("manifest.") && name.contains("-of-")) {
+        if name == SEALED || (name.starts_with("_manifest.") && name.contains("-of-")) {
             found.push(entry.path());
         }
     }

@@ -98,7 +98,7 @@ impl ChunkFormat {
         match self {
             ChunkFormat::Zarr { .. } => {
                 let names = plan.schema.fields.iter().map(|field| field.name.clone());
-                let constants = plan.schema.constants.iter().map(|constant| constant.name.clone());
+                let constants = plan.schema.shared.iter().map(|constant| constant.name.clone());
                 names.chain(constants).chain(["wavelength".to_owned()]).collect()
             }
             ChunkFormat::Npy | ChunkFormat::Parquet => Vec::new(),
@@ -135,6 +135,15 @@ pub enum SetMode {
     Replace,
     /// Check it, and do what is missing.
     Resume,
+}
+
+/// The number of chunks that are done, and of all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// The number of chunks that are done.
+    pub done: u64,
+    /// The number of all chunks.
+    pub chunks: u64,
 }
 
 /// A set that is being written.
@@ -231,10 +240,10 @@ impl SetWriter {
         ranges
     }
 
-    /// How many chunks this process's part has, and how many of them are done.
-    pub fn progress(&self) -> (u64, u64) {
+    /// The chunks of this process's part, and those of them that are done.
+    pub fn progress(&self) -> Progress {
         let own = self.shard.of(self.plan.chunks());
-        (own.end - own.start, self.manifest.chunks.len() as u64)
+        Progress { done: self.manifest.chunks.len() as u64, chunks: own.end - own.start }
     }
 
     /// Where the chunks are until the set is complete.
@@ -305,15 +314,14 @@ impl SetWriter {
         seal::seal(&self.path, self.start == SetMode::Replace)
     }
 
-    /// Keeps what is finished, and leaves the rest to another run. Says how many chunks of how many that is.
-    pub fn stop(mut self) -> Result<(u64, u64), OutputError> {
+    /// Keeps what is finished, and leaves the rest to another run.
+    pub fn stop(mut self) -> Result<Progress, OutputError> {
         self.pool.stop();
         let _ = self.collect(); // its error is the reason to stop, if there is one
         if self.root != self.path {
             self.save()?;
         }
-        let (all, done) = self.progress();
-        Ok((done, all))
+        Ok(self.progress())
     }
 
     fn failed(&self, source: io::Error) -> OutputError {

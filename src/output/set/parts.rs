@@ -24,16 +24,16 @@ pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Resul
 pub(super) fn npy_metadata(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
     let bytes: Vec<u8> = schema.wavelengths.iter().flat_map(|w| w.to_le_bytes()).collect();
     let bytes = npy::file("<f8", &[schema.wavelengths.len() as u64], &bytes)?;
-    Ok(vec![Part { name: "wavelengths.npy".to_owned(), bytes: bytes.into() }])
+    Ok(vec![Part { name: "wavelength.npy".to_owned(), bytes: bytes.into() }])
 }
 
 /// The `.npy` files of what all draws share.
 pub(super) fn npy_constants(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
     let part = |constant: &SharedArray| {
-        let bytes = npy::file(npy::type_string(constant.element), &constant.shape(), &constant.bytes)?;
+        let bytes = npy::file(npy::type_string(constant.dtype), &constant.shape(), &constant.bytes)?;
         Ok(Part { name: format!("{}.npy", constant.name), bytes: bytes.into() })
     };
-    schema.constants.iter().map(part).collect()
+    schema.shared.iter().map(part).collect()
 }
 
 /// The `.parquet` file of one chunk.

@@ -61,9 +61,9 @@ pub(super) fn metadata(schema: &Schema, level: Level, rows: u64) -> Vec<Part<'st
         .iter()
         .map(|field| (field.name.clone(), array(field, &schema.row, (schema.count, rows), level)))
         .collect();
-    arrays.extend(schema.constants.iter().map(|constant| {
+    arrays.extend(schema.shared.iter().map(|constant| {
         let codecs = [json!({ "name": "bytes", "configuration": { "endian": "little" } })];
-        let (shape, data_type) = (constant.shape(), constant.element.name());
+        let (shape, data_type) = (constant.shape(), constant.dtype.name());
         let names: Vec<_> = constant.axes.iter().map(|(name, _)| name.as_str()).collect();
         (constant.name.clone(), node(&shape, &shape, data_type, &codecs, &names, json!({})))
     }));
@@ -93,7 +93,7 @@ pub(super) fn constants(schema: &Schema) -> Vec<Part<'_>> {
         format!("{}/c.0{others}", constant.name)
     };
     schema
-        .constants
+        .shared
         .iter()
         .map(|constant| Part { name: name(constant), bytes: Cow::Borrowed(constant.bytes.as_slice()) })
         .collect()

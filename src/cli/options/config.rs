@@ -14,10 +14,10 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use toml::Value;
 
-use super::Usage;
+use crate::cli::exit::Usage;
 
 /// The arguments of the program, with those of the file that they name put in where they are missing.
-pub(super) fn expand(command: &Command, given: Vec<OsString>) -> Result<Vec<OsString>, Usage> {
+pub(in crate::cli) fn expand(command: &Command, given: Vec<OsString>) -> Result<Vec<OsString>, Usage> {
     // Arguments that are still missing, or wrong, are for the real parse to name.
     let Ok(matches) = command.clone().ignore_errors(true).try_get_matches_from(&given) else {
         return Ok(given);

@@ -44,13 +44,13 @@ const ACCENT: &str = "#3b5b7c";
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Picture<'a> {
+pub(in crate::cli) struct Picture<'a> {
     /// The model.
-    pub(crate) model: &'a Model,
+    pub(in crate::cli) model: &'a Model,
     /// Its plain recipe, where it has one.
-    pub(crate) recipe: Option<&'a Recipe>,
+    pub(in crate::cli) recipe: Option<&'a Recipe>,
     /// The seed of the draws.
-    pub(crate) seed: u64,
+    pub(in crate::cli) seed: u64,
 }
 
 /// One panel: what is drawn, and on what axes.
@@ -58,7 +58,7 @@ type Panel = (Vec<Plot>, Layout);
 
 impl Picture<'_> {
     /// The picture, drawn.
-    pub(crate) fn drawing(&self) -> Scene {
+    pub(in crate::cli) fn drawing(&self) -> Scene {
         let draws = self.draws();
         let panels = [self.mean(), self.basis(), self.unexplained(), self.drawn(&draws)];
         let (plots, layouts) = panels.into_iter().unzip();

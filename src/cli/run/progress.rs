@@ -7,19 +7,31 @@ use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use super::grouped;
+use crate::cli::parse::grouped;
 
 /// How often a line is printed where there is no terminal.
 const LINES: Duration = Duration::from_secs(10);
 
 /// Where progress is shown.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Shown {
+pub(super) enum Shown {
     /// As a bar, but not before a second has passed.
     Later,
     Bar,
     Lines,
     Never,
+}
+
+impl Shown {
+    /// How progress is shown of a run that is quiet or not, and whose data go to standard output or not.
+    pub(super) fn to(quiet: bool, to_stdout: bool) -> Shown {
+        match (io::stderr().is_terminal(), to_stdout && io::stdout().is_terminal()) {
+            _ if quiet => Shown::Never,
+            (_, true) => Shown::Never, // with data on the same terminal it would only be in the way
+            (true, false) => Shown::Later,
+            (false, false) => Shown::Lines,
+        }
+    }
 }
 
 pub(super) struct Progress {
@@ -29,8 +41,8 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Progress towards `count` draws, for a person or for nobody.
-    pub(super) fn new(count: u64, quiet: bool, to_stdout: bool) -> Progress {
+    /// Progress towards `count` rows.
+    pub(super) fn new(count: u64, shown: Shown) -> Progress {
         let style = "{bar:40} {percent:>3} %  {human_pos} of {human_len}  {rate}  {eta} left";
         let rate = |state: &ProgressState, to: &mut dyn fmt::Write| {
             let _ = write!(to, "{:.1} million/s", state.per_sec() / 1e6);
@@ -39,12 +51,6 @@ impl Progress {
         bar.set_style(
             ProgressStyle::with_template(style).expect("the template is right").with_key("rate", rate),
         );
-        let shown = match (io::stderr().is_terminal(), to_stdout && io::stdout().is_terminal()) {
-            _ if quiet => Shown::Never,
-            (_, true) => Shown::Never, // with data on the same terminal it would only be in the way
-            (true, false) => Shown::Later,
-            (false, false) => Shown::Lines,
-        };
         Progress { bar, shown: shown.into(), last_line: Instant::now().into() }
     }
 

@@ -9,7 +9,7 @@ use std::ops::Range;
 use kuva::render::render::{Primitive, Scene as Drawing, TextAnchor};
 use spectroll::evaluation::plot::{self, DARK, INK, PALE, QUIET, line, rectangle};
 use spectroll::scene::{GroupKind, Scene, Window};
-use spectroll::{Engine, EngineError, Grid, colorimetry};
+use spectroll::{Engine, EngineError, Grid, Quantity, colorimetry};
 
 /// Tiles in a row, and rows of them.
 const TILES: (usize, usize) = (5, 2);
@@ -41,7 +41,7 @@ const X: (f64, f64) = (0.0, 0.8);
 const Y: (f64, f64) = (0.0, 0.9);
 
 /// Scenes, and what they look like.
-pub(super) struct Preview {
+pub(in crate::cli) struct Preview {
     first: u64,
     tiles: Vec<Tile>,
     lights: Vec<Point>,
@@ -69,7 +69,11 @@ struct Point {
 }
 
 impl Preview {
-    pub(super) fn new(scene: &Scene, engine: &Engine, scenes: &Range<u64>) -> anyhow::Result<Preview> {
+    pub(in crate::cli) fn new(
+        scene: &Scene,
+        engine: &Engine,
+        scenes: &Range<u64>,
+    ) -> anyhow::Result<Preview> {
         let mut preview = Preview {
             first: scenes.start,
             tiles: Vec::new(),
@@ -97,9 +101,9 @@ impl Preview {
     fn add(&mut self, scene: &Scene, values: &Values) {
         let grid = scene.grid();
         let groups = scene.workload(1).groups;
-        let of = |role: GroupKind| {
+        let of = |kind: GroupKind| {
             let names =
-                groups.iter().filter(move |group| group.role == role).map(|group| group.name.as_str());
+                groups.iter().filter(move |group| group.kind == kind).map(|group| group.name.as_str());
             names.flat_map(|name| values.of(name).chunks_exact(grid.len())).collect::<Vec<_>>()
         };
         let lights = of(GroupKind::Illuminant);
@@ -109,8 +113,8 @@ impl Preview {
         };
         let Some(weights) = colorimetry::xyz_weights_under(&light, grid) else { return };
         let shone: Vec<_> = lights.iter().map(|light| xyz(light, &emitted(grid))).collect();
-        let reflected = |role| of(role).into_iter().map(|s| xyz(s, &weights)).collect::<Vec<_>>();
-        let (surfaces, targets) = (reflected(GroupKind::Surface), reflected(GroupKind::Destination));
+        let reflected = |kind| of(kind).into_iter().map(|s| xyz(s, &weights)).collect::<Vec<_>>();
+        let (surfaces, targets) = (reflected(GroupKind::Surface), reflected(GroupKind::Target));
         if self.tiles.len() < TILES.0 * TILES.1 {
             // The lights of a scene keep their ratios.
             let brightest = shone.iter().map(|xyz| xyz[1]).fold(0.0, f64::max);
@@ -136,7 +140,7 @@ impl Preview {
     }
 
     /// The picture, drawn.
-    pub(super) fn drawing(&self) -> Drawing {
+    pub(in crate::cli) fn drawing(&self) -> Drawing {
         let rows = self.tiles.len().div_ceil(TILES.0).max(1);
         let width = TILES.0 as f64 * (TILE.0 + GAP) + DIAGRAM + 2.0 * GAP;
         let height = HEAD + (rows as f64 * (TILE.1 + CAPTION + GAP)).max(DIAGRAM);

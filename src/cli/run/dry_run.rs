@@ -5,11 +5,12 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
+use spectroll::export::{Destination, Output};
 use spectroll::output::{Field, FileFormat, Schema};
 use spectroll::{Engine, Recipe, Stream};
 
-use super::sink::{Destination, OutputArguments};
-use super::{folder, grouped};
+use crate::cli::folder;
+use crate::cli::parse::{grouped, size};
 
 /// How long the drawing is tried.
 const TRIAL: Duration = Duration::from_millis(300);
@@ -19,7 +20,7 @@ const TEXT: u64 = 11;
 
 /// What would be made.
 #[derive(Serialize)]
-pub(super) struct DryRun {
+pub(in crate::cli) struct DryRun {
     output: String,
     draws: u64,
     arrays: Vec<Array>,
@@ -35,7 +36,7 @@ pub(super) struct DryRun {
     /// Free bytes where it would be; nothing of standard output, nor where there is no such folder.
     free: Option<u64>,
     #[serde(skip)]
-    target: Destination,
+    destination: Destination,
 }
 
 #[derive(Serialize)]
@@ -46,9 +47,8 @@ struct Array {
 }
 
 impl DryRun {
-    pub(super) fn new(
-        output: &OutputArguments,
-        target: Destination,
+    pub(in crate::cli) fn new(
+        output: &Output,
         schema: &Schema,
         recipe: &Recipe,
         engine: &Engine,
@@ -58,21 +58,19 @@ impl DryRun {
             shape: field.shape(schema.count),
             dtype: field.stored.name(),
         };
-        let is_text =
-            matches!(target, Destination::Stdout | Destination::Spd | Destination::File(FileFormat::Csv));
+        let is_text = matches!(
+            output.destination(),
+            Destination::Stdout(FileFormat::Csv)
+                | Destination::SpdFolder
+                | Destination::File(FileFormat::Csv)
+        );
         let row = match is_text {
             true => schema.fields.iter().map(|field| TEXT * field.width as u64).sum(),
             false => schema.row_bytes(),
         };
-        let chunks = match target {
-            Destination::Set(layout) => {
-                let plan = output.plan(layout, schema);
-                Some((plan.chunks(), plan.chunk))
-            }
-            _ => None,
-        };
+        let chunks = output.plan(schema).map(|plan| (plan.chunks(), plan.chunk));
         Ok(DryRun {
-            output: output.output.display().to_string(),
+            output: output.path().display().to_string(),
             draws: schema.count,
             arrays: schema.fields.iter().map(array).collect(),
             bytes: schema.count.saturating_mul(row),
@@ -80,12 +78,16 @@ impl DryRun {
             acceptance: recipe.acceptance(),
             engine: engine.to_string(),
             draws_per_second: rate(recipe, engine)?,
-            free: if target == Destination::Stdout { None } else { free(&output.output) },
-            target,
+            free: if matches!(output.destination(), Destination::Stdout(_)) {
+                None
+            } else {
+                free(output.path())
+            },
+            destination: output.destination(),
         })
     }
 
-    pub(super) fn print(&self, json: bool) -> anyhow::Result<()> {
+    pub(in crate::cli) fn print(&self, json: bool) -> anyhow::Result<()> {
         let mut out = std::io::stdout();
         if json {
             return Ok(writeln!(out, "{}", serde_json::to_string_pretty(self)?)?);
@@ -95,12 +97,12 @@ impl DryRun {
             writeln!(out, "  {name}: {shape:?} {dtype}")?;
         }
         let bytes = size(self.bytes);
-        match (self.chunks, self.target) {
+        match (self.chunks, self.destination) {
             (Some((chunks, draws)), _) => {
                 writeln!(out, "  {bytes} in {} chunks of {} draws", grouped(chunks), grouped(draws))?;
             }
-            (None, Destination::Spd) => writeln!(out, "  {} files of text", grouped(self.draws))?,
-            (None, Destination::Stdout | Destination::File(FileFormat::Csv)) => {
+            (None, Destination::SpdFolder) => writeln!(out, "  {} files of text", grouped(self.draws))?,
+            (None, Destination::Stdout(FileFormat::Csv) | Destination::File(FileFormat::Csv)) => {
                 writeln!(out, "  about {bytes} of text")?
             }
             (None, _) => writeln!(out, "  {bytes}")?,
@@ -109,7 +111,7 @@ impl DryRun {
         writeln!(out, "  drawn by {engine}, about {accepted:.2} % of the candidates accepted")?;
         let (rate, seconds) = (self.draws_per_second / 1e6, self.draws as f64 / self.draws_per_second);
         writeln!(out, "  {seconds:.1} s of drawing at {rate:.1} million a second, besides the writing")?;
-        if self.target != Destination::Stdout {
+        if !matches!(self.destination, Destination::Stdout(_)) {
             writeln!(out, "  {}", room(Path::new(&self.output), self.bytes, self.free))?;
         }
         Ok(())
@@ -132,12 +134,12 @@ fn rate(recipe: &Recipe, engine: &Engine) -> anyhow::Result<f64> {
 }
 
 /// Free bytes in the folder of a path, if there is such a folder.
-pub(super) fn free(path: &Path) -> Option<u64> {
+pub(in crate::cli) fn free(path: &Path) -> Option<u64> {
     fs4::available_space(folder(path)).ok()
 }
 
 /// Whether the disk has room, with so much of it free.
-pub(super) fn room(path: &Path, bytes: u64, free: Option<u64>) -> String {
+pub(in crate::cli) fn room(path: &Path, bytes: u64, free: Option<u64>) -> String {
     let folder = folder(path);
     match free {
         Some(free) => {
@@ -145,15 +147,5 @@ pub(super) fn room(path: &Path, bytes: u64, free: Option<u64>) -> String {
             format!("{} are free in {folder:?}, which is {enough}", size(free))
         }
         None => format!("{folder:?} does not exist: create it first"),
-    }
-}
-
-/// Bytes in the unit that suits them.
-pub(super) fn size(bytes: u64) -> String {
-    let units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"];
-    let power = (bytes.max(1).ilog10() / 3) as usize;
-    match power {
-        0 => format!("{bytes} bytes"),
-        _ => format!("{:.1} {}", bytes as f64 / 1000f64.powi(power as i32), units[power]),
     }
 }

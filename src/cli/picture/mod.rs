@@ -1,5 +1,8 @@
 //! Pictures as files, for the commands that make some.
 
+pub(super) mod model;
+pub(super) mod scene;
+
 use std::path::Path;
 
 use anyhow::anyhow;
@@ -7,7 +10,7 @@ use kuva::render::render::Scene;
 use spectroll::evaluation::plot::PictureFormat;
 use spectroll::output::{IfExists, write_file};
 
-use super::Usage;
+use super::exit::Usage;
 
 /// The format that the extension of `path` names.
 pub(super) fn format(path: &Path) -> Result<PictureFormat, Usage> {

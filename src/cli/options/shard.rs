@@ -5,11 +5,11 @@ use std::str::FromStr;
 
 use spectroll::output::Shard;
 
-use super::Usage;
+use crate::cli::exit::Usage;
 
 /// What was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ShardName {
+pub(in crate::cli) enum ShardName {
     /// `I/N`.
     Given(Shard),
     /// `auto`, or `auto/N` where the surroundings do not say how many there are.
@@ -39,7 +39,7 @@ impl FromStr for ShardName {
 
 impl ShardName {
     /// The shard that this process is to make.
-    pub(super) fn resolve(self) -> Result<Shard, Usage> {
+    pub(in crate::cli) fn resolve(self) -> Result<Shard, Usage> {
         match self {
             ShardName::Given(shard) => Ok(shard),
             ShardName::Auto(count) => {

@@ -1,0 +1,106 @@
+//! The errors of the program itself, and the exit code that each kind of error has.
+
+use spectroll::export::{ExportError, SelectionError};
+use spectroll::output::OutputError;
+use spectroll::scene::SceneError;
+use spectroll::{DatasetError, EngineError, FitError, ModelError, RecipeError, WgslError};
+
+use super::interrupt::Interrupted;
+
+/// A request that cannot be meant, beyond what the argument parser can tell.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct Usage(pub(super) String);
+
+/// A data set is not what was written.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct Unverified(pub(super) String);
+
+/// The exit code of an error.
+pub(super) fn code(error: &anyhow::Error) -> u8 {
+    if error.is::<Interrupted>() {
+        130
+    } else if let Some(error) = error.downcast_ref::<EngineError>() {
+        of_engine(error)
+    } else if let Some(error) = error.downcast_ref::<OutputError>() {
+        of_output(error)
+    } else if let Some(error) = error.downcast_ref::<ExportError>() {
+        of_export(error)
+    } else if error.is::<DatasetError>() || error.is::<FitError>() || error.is::<ModelError>() {
+        4
+    } else if error.is::<Unverified>() {
+        5
+    } else if error.is::<RecipeError>()
+        || error.is::<SceneError>()
+        || error.is::<SelectionError>()
+        || error.is::<WgslError>()
+        || error.is::<Usage>()
+    {
+        2
+    } else {
+        1
+    }
+}
+
+fn of_engine(error: &EngineError) -> u8 {
+    match error {
+        EngineError::NoAdapter { .. } | EngineError::NoAdapters => 3,
+        _ => 1,
+    }
+}
+
+fn of_output(error: &OutputError) -> u8 {
+    use OutputError::{Cannot, Damaged, NotBuilt, UnknownFormat};
+    match error {
+        UnknownFormat { .. } | Cannot { .. } | NotBuilt { .. } => 2,
+        Damaged { .. } => 5,
+        _ => 1,
+    }
+}
+
+fn of_export(error: &ExportError) -> u8 {
+    match error {
+        ExportError::Engine(error) => of_engine(error),
+        ExportError::Output(error) => of_output(error),
+        ExportError::Interrupted => 130,
+        ExportError::Unfinished { cause, .. } => of_export(cause),
+        _ => 1,
+    }
+}
+
+/// The option that does what the message of an error advises, for messages of the library, which knows no options.
+pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
+    let output = error.downcast_ref::<OutputError>().or(match error.downcast_ref::<ExportError>() {
+        Some(ExportError::Output(error)) => Some(error),
+        _ => None,
+    });
+    if let Some(error) = output {
+        return match error {
+            OutputError::UnknownFormat { .. } => " (--format)",
+            OutputError::Exists { .. } | OutputError::ManyFiles { .. } | OutputError::Damaged { .. } => {
+                " (--force does)"
+            }
+            OutputError::Unfinished { .. } => " (--resume or --force)",
+            OutputError::Cannot { holds: "one array" | "spectra", .. } => {
+                " (--quantities, or --arrays for scenes)"
+            }
+            OutputError::Cannot { holds: "f32 and f64", .. } => " (--dtype)",
+            OutputError::NotBuilt { .. } => " (cargo build --features)",
+            _ => "",
+        };
+    }
+    match error.downcast_ref::<DatasetError>() {
+        Some(DatasetError::NoWavelengths { .. }) => " (--wavelengths)",
+        Some(DatasetError::Range { .. }) => " (--wavelengths, --extrapolate)",
+        _ if matches!(error.downcast_ref(), Some(FitError::Power { .. })) => " (--normalize none)",
+        _ if matches!(error.downcast_ref(), Some(EngineError::NoAdapters)) => " (--engine cpu)",
+        _ => "",
+    }
+}
+
+/// Whether whoever read standard output has what it wanted and went away.
+pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let broken = |e: &std::io::Error| e.kind() == std::io::ErrorKind::BrokenPipe;
+    error.chain().any(|cause| cause.downcast_ref().is_some_and(broken))
+}

@@ -1,0 +1,70 @@
+//! Ctrl-C and the like, which long work asks for from time to time.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+
+use spectroll::export::{Destination, Output};
+
+/// Somebody pressed Ctrl-C.
+#[derive(Debug, thiserror::Error)]
+#[error("interrupted; {0}")]
+pub(super) struct Interrupted(pub(super) String);
+
+/// Whether somebody asked for an end. Nothing until [`watch`].
+static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// From here on Ctrl-C and the like are for [`check`] to see; before, they end the program. The end of its terminal
+/// stays ignored where whoever started it ignores that, as `nohup` does. (Shells ignore SIGINT for whatever scripts start
+/// with `&`, and mean nothing by it.)
+pub(super) fn watch() {
+    let flag = INTERRUPTED.get_or_init(Arc::default);
+    let register = |signal| {
+        signal_hook::flag::register(signal, flag.clone()).expect("it is a signal that can be handled");
+    };
+    register(signal_hook::consts::SIGINT);
+    register(signal_hook::consts::SIGTERM);
+    #[cfg(unix)]
+    if !is_ignored(signal_hook::consts::SIGHUP) {
+        register(signal_hook::consts::SIGHUP);
+    }
+}
+
+/// Opens an output, and watches from when that should not be ended by the signal itself. Checking what is there of a set
+/// may take minutes and be ended at any moment; a file that is begun may not.
+pub(super) fn around<T>(output: &Output, open: impl FnOnce() -> T) -> T {
+    let is_set = matches!(output.destination(), Destination::Set(_));
+    if !is_set {
+        watch();
+    }
+    let opened = open();
+    if is_set {
+        watch();
+    }
+    opened
+}
+
+/// Whether a signal is ignored, as far as Linux tells.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> (signal - 1) & 1 == 1
+}
+
+/// A break once Ctrl-C was pressed.
+pub(super) fn flow() -> ControlFlow<()> {
+    match INTERRUPTED.get().is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    }
+}
+
+/// An error once Ctrl-C was pressed, for work that leaves nothing behind.
+pub(super) fn check() -> Result<(), Interrupted> {
+    match flow() {
+        ControlFlow::Break(()) => Err(Interrupted("nothing was left behind".to_owned())),
+        ControlFlow::Continue(()) => Ok(()),
+    }
+}

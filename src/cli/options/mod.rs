@@ -1,0 +1,11 @@
+//! Groups of options that several commands share.
+
+pub(super) mod config;
+mod engine;
+mod output;
+mod recipe;
+mod shard;
+
+pub(super) use engine::EngineArguments;
+pub(super) use output::OutputArguments;
+pub(super) use recipe::RecipeArguments;

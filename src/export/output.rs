@@ -1,0 +1,128 @@
+//! Where a data set goes, and how it is written there.
+
+use std::path::{Path, PathBuf};
+
+use crate::output::{ChunkFormat, FileFormat, IfExists, OutputError, Schema, SetMode, SetPlan, Shard};
+use crate::quantity::Dtype;
+
+/// The kind of thing that is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Destination {
+    /// Standard output, as it is drawn.
+    Stdout(FileFormat),
+    /// A single file.
+    File(FileFormat),
+    /// A folder of text files, one a spectrum.
+    SpdFolder,
+    /// A set of chunks.
+    Set(ChunkFormat),
+}
+
+impl Destination {
+    /// Whether what all rows share can be kept once, rather than in every row.
+    pub fn holds_shared_arrays(self) -> bool {
+        match self {
+            Destination::Stdout(_) | Destination::SpdFolder | Destination::Set(ChunkFormat::Parquet) => false,
+            Destination::File(format) => {
+                !matches!(format, FileFormat::Csv | FileFormat::Parquet | FileFormat::Npy)
+            }
+            Destination::Set(_) => true,
+        }
+    }
+}
+
+/// Where a data set goes, and how it is written there. See [`Output::to`].
+#[derive(Clone, Debug)]
+pub struct Output {
+    pub(super) path: PathBuf,
+    pub(super) destination: Destination,
+    dtype: Dtype,
+    chunk: Option<u64>,
+    pub(super) shard: Shard,
+    pub(super) mode: SetMode,
+}
+
+impl Output {
+    /// A file, or a set of chunks, in the format that the extension of `path` names: float32, all of it, and only if
+    /// nothing of that name exists.
+    pub fn to(path: impl AsRef<Path>) -> Result<Output, OutputError> {
+        let path = path.as_ref();
+        let destination = match FileFormat::of(path)? {
+            FileFormat::Zarr => Destination::Set(ChunkFormat::Zarr { zstd: None }),
+            FileFormat::Spd => Destination::SpdFolder,
+            file => Destination::File(file),
+        };
+        Ok(Output::at(path, destination))
+    }
+
+    /// What `destination` says at `path`, which standard output does not need.
+    pub fn at(path: impl AsRef<Path>, destination: Destination) -> Output {
+        Output {
+            path: path.as_ref().to_owned(),
+            destination,
+            dtype: Dtype::F32,
+            chunk: None,
+            shard: Shard::WHOLE,
+            mode: SetMode::Create,
+        }
+    }
+
+    /// The type of the numbers ([`Dtype::F32`]).
+    pub fn dtype(self, dtype: Dtype) -> Self {
+        Output { dtype, ..self }
+    }
+
+    /// The number of rows in each chunk of a set, at least 1 (what makes about 16 MiB).
+    pub fn chunk(self, rows: u64) -> Self {
+        Output { chunk: Some(rows.max(1)), ..self }
+    }
+
+    /// The part of a set that this process makes ([`Shard::WHOLE`]).
+    pub fn shard(self, shard: Shard) -> Self {
+        Output { shard, ..self }
+    }
+
+    /// What to do with what exists already ([`SetMode::Create`]). Only sets can be resumed.
+    pub fn mode(self, mode: SetMode) -> Self {
+        Output { mode, ..self }
+    }
+
+    /// The path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The kind of thing that is written.
+    pub fn destination(&self) -> Destination {
+        self.destination
+    }
+
+    /// The type that floats are written as.
+    pub(super) fn stored(&self) -> Dtype {
+        self.dtype
+    }
+
+    /// Refuses what the destination cannot hold.
+    pub fn check(&self, schema: &Schema) -> Result<(), OutputError> {
+        match self.destination {
+            Destination::Stdout(format) | Destination::File(format) => format.check(&self.path, schema),
+            Destination::SpdFolder => FileFormat::Spd.check(&self.path, schema),
+            Destination::Set(chunks) => chunks.check(&self.path, schema),
+        }
+    }
+
+    /// The plan of a set; `None` of anything else.
+    pub fn plan(&self, schema: &Schema) -> Option<SetPlan> {
+        let Destination::Set(layout) = self.destination else { return None };
+        let default = || ChunkFormat::default_chunk(schema.row_bytes(), schema.count);
+        Some(SetPlan { layout, chunk: self.chunk.unwrap_or_else(default), schema: schema.clone() })
+    }
+
+    pub(super) fn if_exists(&self) -> IfExists {
+        match self.mode {
+            SetMode::Replace => IfExists::Replace,
+            SetMode::Create | SetMode::Resume => IfExists::Refuse,
+        }
+    }
+}

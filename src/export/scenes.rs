@@ -1,0 +1,271 @@
+//! Scenes as a data set: a row a scene, its arrays as columns, and beside them what all scenes share.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::ops::{ControlFlow, Range};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+use super::provenance::{Sum, model_sum};
+use super::{Companions, ExportError, Output, Rows, Window, Writing};
+use crate::engine::{Engine, EngineError};
+use crate::output::{Field, Schema, SharedArray, SpdName};
+use crate::scene::{Array, GroupKind, GroupSummary, Scene, SceneSession};
+
+/// About how many spectra tell how an engine rounds, and in how many scenes at most.
+const ROUNDED: (u64, u64) = (4096, 64);
+
+/// The arrays of a scene that are wanted.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ArraySelection {
+    /// The only group, where one is named.
+    pub only: Option<String>,
+    /// The names of the arrays; all where none is named.
+    #[serde(default)]
+    pub arrays: Vec<String>,
+}
+
+/// Error returned by [`ArraySelection::apply`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no {what} {name:?}{}; there are {}", suggestion(name, known), known.join(", "))]
+pub struct SelectionError {
+    what: &'static str,
+    name: String,
+    known: Vec<String>,
+}
+
+fn suggestion(name: &str, known: &[String]) -> String {
+    let nearest = crate::suggestion::closest(name, known.iter().map(String::as_str));
+    nearest.map_or_else(String::new, |near| format!(", did you mean {near:?}?"))
+}
+
+impl ArraySelection {
+    /// The scene with the groups alone that these arrays need.
+    pub fn apply(&self, mut scene: Scene) -> Result<Scene, SelectionError> {
+        let unknown = |what, name: &str, known| SelectionError { what, name: name.to_owned(), known };
+        if let Some(only) = &self.only {
+            let known: Vec<_> = scene.groups().map(str::to_owned).collect();
+            scene = scene.only(only).ok_or_else(|| unknown("group", only, known))?;
+        }
+        let known: Vec<_> = scene.arrays().map(|array| array.name.clone()).collect();
+        if let Some(name) = self.arrays.iter().find(|name| !known.contains(name)) {
+            return Err(unknown("array", name, known));
+        }
+        let wanted: Vec<_> =
+            scene.arrays().filter(|array| self.has(array)).map(|array| array.group.clone()).collect();
+        Ok(scene.keep(|group| wanted.iter().any(|name| name == group)).expect("every array is of a group"))
+    }
+
+    /// Whether an array is wanted.
+    pub fn has(&self, array: &Array) -> bool {
+        self.arrays.is_empty() || self.arrays.contains(&array.name)
+    }
+}
+
+/// Scenes that are to be written.
+#[derive(Clone)]
+pub struct SceneExport<'a> {
+    scene: &'a Scene,
+    scenes: Range<u64>,
+    selection: ArraySelection,
+    /// The name and the text of the scene file.
+    file: Option<(String, String)>,
+}
+
+impl<'a> SceneExport<'a> {
+    /// An export of some scenes, with all their arrays.
+    pub fn new(scene: &'a Scene, scenes: Range<u64>) -> SceneExport<'a> {
+        SceneExport { scene, scenes, selection: ArraySelection::default(), file: None }
+    }
+
+    /// The arrays that are wanted, of a scene that [`ArraySelection::apply`] gave.
+    pub fn selection(self, selection: ArraySelection) -> Self {
+        SceneExport { selection, ..self }
+    }
+
+    /// The name and the text of the file that the scene was read from, which the data set records so that it can be
+    /// verified.
+    pub fn file(self, name: &str, text: &str) -> Self {
+        SceneExport { file: Some((name.to_owned(), text.to_owned())), ..self }
+    }
+
+    /// What the data set holds, and what it is made from. The shared arrays have no values yet.
+    pub fn schema(&self, output: &Output) -> Schema {
+        let holds_shared = output.destination().holds_shared_arrays();
+        let wanted = || self.scene.arrays().filter(|array| self.selection.has(array));
+        let varying = wanted().filter(|array| array.per_scene);
+        let (shared, repeated): (Vec<_>, Vec<_>) =
+            wanted().filter(|array| !array.per_scene).partition(|_| holds_shared);
+        Schema {
+            fields: varying.chain(repeated).map(|array| field(array).stored_as(output.stored())).collect(),
+            row: "scene".to_owned(),
+            shared: shared.into_iter().map(description).collect(),
+            count: self.scenes.end - self.scenes.start,
+            wavelengths: self.scene.grid().wavelengths().collect(),
+            attributes: self.attributes(),
+        }
+    }
+
+    /// What lies beside the rows.
+    pub fn companions(&self) -> Companions {
+        let spd = match self.scene.arrays().find(|array| self.selection.has(array)).map(|array| array.kind) {
+            Some(GroupKind::Illuminant) => SpdName::Illuminant,
+            _ => SpdName::Reflectance,
+        };
+        let files = self.file.iter().map(|(_, text)| ("_scene.toml", text.clone())).collect();
+        Companions { spd: (spd, self.scenes.start), files }
+    }
+
+    /// The rows, to be drawn by an engine.
+    pub fn rows(&self, engine: &'a Engine, schema: &Schema) -> Result<SceneRows<'a>, EngineError> {
+        SceneRows::new(self.scene, engine, schema, self.scenes.start)
+    }
+
+    /// Draws and writes the whole.
+    pub fn write(&self, engine: &'a Engine, output: &Output) -> Result<Vec<GroupSummary>, ExportError> {
+        let schema = self.schema(output);
+        output.check(&schema)?;
+        let mut rows = self.rows(engine, &schema)?;
+        let writing = Writing::open(output, schema, &self.companions(), engine, &mut rows)?;
+        writing.run(&mut rows, &mut |_| ControlFlow::Continue(()))?;
+        Ok(rows.drawn)
+    }
+
+    fn attributes(&self) -> Map<String, Value> {
+        let (name, text) = self.file.clone().unwrap_or_default();
+        let attributes = json!({
+            "scene_file": name,
+            "scene": text,
+            "models_blake3": model_sums(self.scene),
+            "selection": self.selection,
+            "seed": self.scene.seed(),
+            "start": self.scenes.start,
+            "program": concat!("spectroll ", env!("CARGO_PKG_VERSION")),
+        });
+        let Value::Object(attributes) = attributes else { unreachable!("it is written as one") };
+        attributes
+    }
+}
+
+/// The BLAKE3 sum of each group's model, where it has one, by the name of the group.
+pub fn model_sums(scene: &Scene) -> BTreeMap<String, String> {
+    scene.models().map(|(group, model)| (group.to_owned(), model_sum(model))).collect()
+}
+
+/// Scenes as rows of a data set.
+pub struct SceneRows<'a> {
+    scene: &'a Scene,
+    session: SceneSession<'a>,
+    /// The first scene of the data set.
+    first: u64,
+    /// The names of the columns.
+    columns: Vec<String>,
+    /// The columns among them that are the same in every row, each with an entry of it.
+    repeated: Vec<(String, Vec<u8>)>,
+    /// A summary of each group's draws.
+    pub drawn: Vec<GroupSummary>,
+}
+
+impl<'a> SceneRows<'a> {
+    /// The rows of a schema, from scene `first` on.
+    pub fn new(
+        scene: &'a Scene,
+        engine: &'a Engine,
+        schema: &Schema,
+        first: u64,
+    ) -> Result<SceneRows<'a>, EngineError> {
+        let session = scene.session(engine)?;
+        let columns: Vec<String> = schema.fields.iter().map(|field| field.name.clone()).collect();
+        let shared = session.constants().into_iter();
+        let repeated = shared
+            .filter(|(array, _)| columns.contains(&array.name))
+            .map(|(array, bytes)| (array.name.clone(), bytes))
+            .collect();
+        let drawn = session.taken_once();
+        Ok(SceneRows { scene, session, first, columns, repeated, drawn })
+    }
+}
+
+impl Rows for SceneRows<'_> {
+    fn rounding(&mut self) -> Result<String, EngineError> {
+        let groups = self.scene.workload(1).groups;
+        let each: u64 = groups.iter().map(|group| group.draws_per_scene).sum();
+        let scenes = (ROUNDED.0 / each.max(1)).clamp(1, ROUNDED.1).min(self.scene.scenes());
+        let mut sum = Sum::default();
+        self.session.draw(0..scenes, |window| {
+            // Scene by scene, so that it does not matter how many windows there are.
+            for scene in 0..window.scenes.end - window.scenes.start {
+                for (array, bytes) in window.arrays() {
+                    let start = scene as usize * array.bytes();
+                    sum.update(&bytes[start..start + array.bytes()]);
+                }
+            }
+            Ok::<_, EngineError>(())
+        })?;
+        Ok(sum.finish())
+    }
+
+    fn draw(&mut self, rows: Range<u64>, window: &mut Window) -> Result<(), ExportError> {
+        let scenes = self.first + rows.start..self.first + rows.end;
+        let (columns, repeated) = (&self.columns, &self.repeated);
+        let drawn = self.session.draw(scenes, |drawn| {
+            let count = drawn.scenes.end - drawn.scenes.start;
+            let column = |name: &String| match repeated.iter().find(|(other, _)| other == name) {
+                Some((_, entry)) => Cow::Owned(entry.repeat(count as usize)),
+                None => Cow::Borrowed(drawn.bytes(name)),
+            };
+            let columns: Vec<_> = columns.iter().map(column).collect();
+            window(&columns.iter().map(|column| &**column).collect::<Vec<_>>(), count)
+        })?;
+        for (all, part) in self.drawn.iter_mut().zip(drawn) {
+            all.summary += part.summary;
+        }
+        Ok(())
+    }
+
+    fn shared(&self, described: &[SharedArray]) -> Vec<SharedArray> {
+        let drawn = self.session.constants();
+        let bytes = |name: &str| drawn.iter().find(|(array, _)| array.name == name);
+        let filled = |array: &SharedArray| {
+            let bytes = bytes(&array.name).map_or_else(Vec::new, |(_, bytes)| bytes.clone());
+            SharedArray { bytes, ..array.clone() }
+        };
+        described.iter().map(filled).collect()
+    }
+}
+
+fn description(array: &Array) -> SharedArray {
+    let extents = array.shape.iter().map(|&extent| extent as u64);
+    let axes = axes(array).into_iter().zip(extents).collect();
+    SharedArray { name: array.name.clone(), axes, dtype: array.dtype(), bytes: Vec::new() }
+}
+
+/// The names of the dimensions of an entry of an array.
+fn axes(array: &Array) -> Vec<String> {
+    let inner = array.quantity.axis();
+    // Not the name of the group alone: xarray takes a dimension of an array's name for its coordinates.
+    let outer = (array.shape.len() > usize::from(inner.is_some())).then(|| format!("{}_number", array.group));
+    outer.into_iter().chain(inner.map(str::to_owned)).collect()
+}
+
+fn field(array: &Array) -> Field {
+    let inner = array.quantity.axis();
+    let field = match inner {
+        Some(axis) => {
+            let width = array.shape.last().copied().unwrap_or(1);
+            Field::vector(&array.name, axis, width, array.dtype()).with_channels(array.quantity.channels())
+        }
+        None => Field::scalar(&array.name, array.dtype()),
+    };
+    let field = match array.range {
+        Some(range) => field.within(range),
+        None => field,
+    };
+    match axes(array).first() {
+        Some(outer) if array.shape.len() > usize::from(inner.is_some()) => {
+            field.repeated(outer, array.shape[0])
+        }
+        _ => field,
+    }
+}

@@ -1,0 +1,168 @@
+//! An export under way: rows from an engine into an output that is open.
+
+use std::io::{self, BufWriter};
+use std::ops::{ControlFlow, Range};
+use std::path::PathBuf;
+
+use super::{Companions, Destination, Output, Rows};
+use crate::engine::{Engine, EngineError};
+use crate::output::{
+    CsvWriter, FileFormat, FileWriter, OutputError, Schema, SetStatus, SetWriter, SpdFolder,
+};
+
+/// Why an export ended before its data set was complete.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// The rows cannot be drawn.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// The rows cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Standard output cannot be written to.
+    #[error("cannot write to standard output: {0}")]
+    Stdout(#[source] io::Error),
+    /// Something of the host's failed while the output was open.
+    #[error("{0}")]
+    Host(Box<dyn std::error::Error + Send + Sync>),
+    /// The host asked for an end.
+    #[error("interrupted")]
+    Interrupted,
+    /// A set stays unfinished: what is finished of it is in its folder, and another run can go on from there.
+    #[error("{cause}; {}", kept(*.done, .folder))]
+    Unfinished {
+        /// What ended it.
+        cause: Box<ExportError>,
+        /// The number of chunks of this process that are finished, and of how many; `None` where that could not be
+        /// written down.
+        done: Option<(u64, u64)>,
+        /// The folder that holds them.
+        folder: PathBuf,
+    },
+}
+
+fn kept(done: Option<(u64, u64)>, folder: &PathBuf) -> String {
+    match done {
+        Some((done, all)) => format!("{done} of {all} chunks are finished in {folder:?}"),
+        None => format!("what is finished is in {folder:?}"),
+    }
+}
+
+/// A data set whose output is open.
+pub struct Writing {
+    sink: Sink,
+    count: u64,
+}
+
+enum Sink {
+    Csv(CsvWriter),
+    File(FileWriter),
+    Spd(SpdFolder),
+    Set(Box<SetWriter>),
+}
+
+impl Writing {
+    /// Opens the output of a data set. Checking what is there of a set that is resumed may take minutes.
+    pub fn open(
+        output: &Output,
+        mut schema: Schema,
+        companions: &Companions,
+        engine: &Engine,
+        rows: &mut dyn Rows,
+    ) -> Result<Writing, ExportError> {
+        schema.shared = rows.shared(&schema.shared);
+        let (path, if_exists) = (output.path(), output.if_exists());
+        if matches!(output.destination, Destination::Set(_)) {
+            schema.attributes.insert("rounding".to_owned(), rows.rounding()?.into());
+        }
+        let sink = match output.destination {
+            Destination::Stdout(FileFormat::Csv) => {
+                let csv = CsvWriter::new(BufWriter::new(io::stdout()), &schema);
+                Sink::Csv(csv.map_err(ExportError::Stdout)?)
+            }
+            Destination::Stdout(format) => unreachable!("{format:?} is not streamed"),
+            Destination::File(format) => Sink::File(FileWriter::create(path, format, &schema, if_exists)?),
+            Destination::SpdFolder => {
+                let (name, first) = companions.spd;
+                Sink::Spd(SpdFolder::create(path, &schema, name, first, if_exists)?)
+            }
+            Destination::Set(_) => {
+                let plan = output.plan(&schema).expect("the destination is a set");
+                let files: Vec<_> =
+                    companions.files.iter().map(|(name, text)| (*name, text.as_str())).collect();
+                // What draws, as far as that can show in the draws.
+                let engine = engine.adapter().map_or_else(|| "CPU".to_owned(), ToString::to_string);
+                let set = SetWriter::open(path, plan, &files, (output.shard, output.mode), &engine)?;
+                Sink::Set(Box::new(set))
+            }
+        };
+        Ok(Writing { sink, count: schema.count })
+    }
+
+    /// The rows that are still to be drawn.
+    pub fn missing(&self) -> Vec<Range<u64>> {
+        match &self.sink {
+            Sink::Set(set) => set.missing(),
+            _ => std::iter::once(0..self.count).collect(),
+        }
+    }
+
+    /// Draws the rows that are missing, and completes the output. `watch` is told of the rows of each window, before they
+    /// are written, and may end it.
+    pub fn run(
+        mut self,
+        rows: &mut dyn Rows,
+        watch: &mut dyn FnMut(u64) -> ControlFlow<()>,
+    ) -> Result<SetStatus, ExportError> {
+        match self.fill(rows, watch) {
+            Ok(()) => self.finish(),
+            Err(error) => Err(self.stop(error)),
+        }
+    }
+
+    /// Keeps what is finished of a set after an error, and adds to the error where that is.
+    pub fn stop(self, error: ExportError) -> ExportError {
+        let Sink::Set(set) = self.sink else { return error };
+        let folder = set.folder().to_owned();
+        let done = set.stop().ok().map(|progress| (progress.done, progress.chunks));
+        ExportError::Unfinished { cause: Box::new(error), done, folder }
+    }
+
+    fn fill(
+        &mut self,
+        rows: &mut dyn Rows,
+        watch: &mut dyn FnMut(u64) -> ControlFlow<()>,
+    ) -> Result<(), ExportError> {
+        let heed = |flow: ControlFlow<()>| match flow {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(ExportError::Interrupted),
+        };
+        for missing in self.missing() {
+            rows.draw(missing, &mut |columns, count| {
+                heed(watch(count))?;
+                self.write(columns)
+            })?;
+        }
+        heed(watch(0))
+    }
+
+    fn write(&mut self, columns: &[&[u8]]) -> Result<(), ExportError> {
+        match &mut self.sink {
+            Sink::Csv(csv) => csv.write(columns).map_err(ExportError::Stdout),
+            Sink::File(file) => Ok(file.write(columns)?),
+            Sink::Spd(folder) => Ok(folder.write(columns)?),
+            Sink::Set(set) => Ok(set.write(columns)?),
+        }
+    }
+
+    fn finish(self) -> Result<SetStatus, ExportError> {
+        match self.sink {
+            Sink::Csv(_) => {} // each window was flushed
+            Sink::File(file) => file.finish()?,
+            Sink::Spd(folder) => folder.finish()?,
+            Sink::Set(set) => return Ok(set.finish()?),
+        }
+        Ok(SetStatus::Sealed)
+    }
+}

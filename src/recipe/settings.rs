@@ -1,0 +1,125 @@
+//! What a recipe asks for, in a form that can be written down and read back.
+
+use serde::{Deserialize, Serialize};
+
+use super::{DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, ProposalKind, Recipe, RecipeBuilder, XyzScale};
+use crate::model::Model;
+use crate::program::Bounds;
+use crate::quantity::Quantity;
+
+/// Everything that distinguishes the draws of a recipe from other draws of the same model. Data sets record it under
+/// `recipe`, so the serialised names are part of their format.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecipeSettings {
+    /// The target luminous reflectance value (LRV).
+    pub lrv: Option<f64>,
+    /// The target tristimulus values under D65.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub xyz: Option<[f64; 3]>,
+    /// What must lie between 0 and 1 where there is a target LRV.
+    pub bounds: Bounds,
+    /// The factor of the weights' covariance.
+    #[serde(rename = "cov_scale")]
+    pub covariance_scale: f64,
+    /// What illuminants are multiplied by.
+    pub intensity: Option<Intensity>,
+    /// The quantities of each draw.
+    pub quantities: Vec<Quantity>,
+    /// The illuminant of reflectances' XYZ and linear sRGB.
+    pub illuminant: Illuminant,
+    /// The scale of illuminants' XYZ and linear sRGB.
+    pub xyz_scale: XyzScale,
+    /// Where candidates come from, as it was asked for.
+    pub proposal: ProposalKind,
+    /// The most candidates that a draw may take.
+    pub max_attempts: u32,
+}
+
+impl Default for RecipeSettings {
+    fn default() -> Self {
+        RecipeSettings {
+            lrv: None,
+            xyz: None,
+            bounds: Bounds::default(),
+            covariance_scale: 1.0,
+            intensity: None,
+            quantities: vec![Quantity::Spectra],
+            illuminant: Illuminant::default(),
+            xyz_scale: XyzScale::default(),
+            proposal: ProposalKind::default(),
+            max_attempts: DEFAULT_MAX_ATTEMPTS,
+        }
+    }
+}
+
+impl RecipeSettings {
+    /// Starts a recipe of a model with these settings. A setting that would change nothing for this model is an error
+    /// of [`RecipeBuilder::build`] only where it differs from its default.
+    pub fn builder(&self, model: &Model) -> RecipeBuilder {
+        let default = RecipeSettings::default();
+        let mut builder = Recipe::builder(model)
+            .covariance_scale(self.covariance_scale)
+            .max_attempts(self.max_attempts)
+            .quantities(self.quantities.iter().copied())
+            .proposal(self.proposal);
+        if let Some(lrv) = self.lrv {
+            builder = builder.lrv(lrv);
+        }
+        if self.lrv.is_some() || self.bounds != default.bounds {
+            builder = builder.bounds(self.bounds);
+        }
+        if let Some(xyz) = self.xyz {
+            builder = builder.xyz(xyz);
+        }
+        if let Some(intensity) = self.intensity {
+            builder = builder.intensity(intensity);
+        }
+        if self.illuminant != default.illuminant {
+            builder = builder.illuminant(self.illuminant.clone());
+        }
+        if self.xyz_scale != default.xyz_scale {
+            builder = builder.xyz_scale(self.xyz_scale);
+        }
+        builder
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What `verify` reads in sets of earlier runs.
+    #[test]
+    fn serialised_names_stay() {
+        let plain = serde_json::to_string(&RecipeSettings::default()).unwrap();
+        assert_eq!(
+            plain,
+            r#"{"lrv":null,"bounds":"base","cov_scale":1.0,"intensity":null,"quantities":["spectra"],"illuminant":"d65","xyz_scale":"absolute","proposal":"auto","max_attempts":65536}"#
+        );
+        let other = RecipeSettings {
+            lrv: Some(0.4),
+            xyz: Some([0.1, 0.2, 0.3]),
+            bounds: Bounds::Both,
+            intensity: Some(Intensity::LogUniform(0.15, 150.0)),
+            quantities: Quantity::ALL.to_vec(),
+            illuminant: Illuminant::Power(vec![1.0, 2.0]),
+            xyz_scale: XyzScale::UnitY,
+            proposal: ProposalKind::Cover,
+            ..RecipeSettings::default()
+        };
+        let text = serde_json::to_string(&other).unwrap();
+        for name in [
+            "\"both\"",
+            "{\"loguniform\":[0.15,150.0]}",
+            "linear_srgb",
+            "{\"power\":[1.0,2.0]}",
+            "\"unit-y\"",
+        ] {
+            assert!(text.contains(name), "{name} in {text}");
+        }
+        assert_eq!(serde_json::from_str::<RecipeSettings>(&text).unwrap(), other);
+        let simple = |intensity| serde_json::to_string(&intensity).unwrap();
+        assert_eq!(simple(Intensity::Data) + &simple(Intensity::Fixed(2.0)), r#""data"{"fixed":2.0}"#);
+    }
+}
