@@ -2,6 +2,7 @@
 //! polls or asks for a device.
 
 use bytemuck::{Pod, Zeroable};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BufferUsages, Device};
 
 use crate::program::Program;
@@ -118,11 +119,19 @@ impl Sampler {
         });
         let tables = (!tables.values.is_empty()).then(|| {
             let bytes = bytemuck::cast_slice(&tables.values);
-            filled_buffer(device, "spectroll tables", BufferUsages::STORAGE, bytes)
+            device.create_buffer_init(&BufferInitDescriptor {
+                label: Some("spectroll tables"),
+                contents: bytes,
+                usage: BufferUsages::STORAGE,
+            })
         });
         let cover = program.proposal.as_ref().map(|proposal| {
             let words = proposal.rounded::<f32>().words();
-            filled_buffer(device, "spectroll cover", BufferUsages::STORAGE, bytemuck::cast_slice(&words))
+            device.create_buffer_init(&BufferInitDescriptor {
+                label: Some("spectroll cover"),
+                contents: bytemuck::cast_slice(&words),
+                usage: BufferUsages::STORAGE,
+            })
         });
         Ok(Sampler {
             pipeline,
@@ -198,12 +207,11 @@ impl Sampler {
             })
         };
         let outputs: Vec<_> = self.formats.iter().map(output).collect();
-        let parameters = filled_buffer(
-            device,
-            "spectroll parameters",
-            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-            bytemuck::bytes_of(&self.parameters(draws)),
-        );
+        let parameters = device.create_buffer_init(&BufferInitDescriptor {
+            label: Some("spectroll parameters"),
+            contents: bytemuck::bytes_of(&self.parameters(draws)),
+            usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+        });
         let at = |format: &ArrayFormat| OUTPUTS_AT + format.quantity as u32;
         let entries: Vec<_> = std::iter::once((PARAMETERS_AT, &parameters))
             .chain(self.tables.iter().map(|tables| (TABLES_AT, tables)))
@@ -302,16 +310,4 @@ impl Prepared {
         queue.write_buffer(&self.parameters, 0, bytemuck::bytes_of(&self.sampler.parameters(draws)));
         Ok(())
     }
-}
-
-pub(crate) fn filled_buffer(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: bytes.len() as u64,
-        usage,
-        mapped_at_creation: true,
-    });
-    buffer.get_mapped_range_mut(..).expect("it is mapped at creation").copy_from_slice(bytes);
-    buffer.unmap();
-    buffer
 }

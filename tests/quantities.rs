@@ -43,7 +43,6 @@ fn all_but(quantity: Quantity) -> impl Iterator<Item = Quantity> {
 fn recipes() -> Vec<(&'static str, Recipe)> {
     let reflected = |builder: RecipeBuilder| builder.quantities(all_but(Quantity::Intensity));
     let shining = |builder: RecipeBuilder| builder.quantities(all_but(Quantity::Lrv));
-    let grid = Model::builtin("munsell-vrhel").expect("it is built in").grid();
     let recipes = [
         ("reflectances", reflected(surfaces())),
         ("reflectances under A", reflected(surfaces()).illuminant(Illuminant::A)),

@@ -19,6 +19,7 @@
 //! ```
 
 mod draws;
+mod model;
 mod output;
 pub mod provenance;
 mod scenes;

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BufferUsages, Device};
 
 use crate::engine::{DrawSummary, EngineError};
@@ -254,5 +255,6 @@ fn pipeline(device: &Device) -> wgpu::ComputePipeline {
 
 /// A buffer of these bytes; of four zeros where there are none, since a binding is not empty.
 fn filled(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
-    crate::sampler::filled_buffer(device, label, usage, if bytes.is_empty() { &[0; 4] } else { bytes })
+    let contents = if bytes.is_empty() { &[0; 4] } else { bytes };
+    device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage })
 }

@@ -18,8 +18,9 @@ mod page;
 mod randomness;
 mod summary;
 
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 
+use chrono::Utc;
 use serde::Serialize;
 
 pub use accuracy::{Accuracy, Errors, Variant};
@@ -170,7 +171,7 @@ impl Bench<'_> {
 
 /// Makes all measurements.
 pub fn measure(options: &Options, watch: Watch) -> Result<Report, ReportError> {
-    let (start, date) = (Instant::now(), date());
+    let (start, date) = (Instant::now(), Utc::now().format("%Y-%m-%d %H:%M UTC").to_string());
     let mut targets = Vec::new();
     for choice in &options.engines {
         targets.push(Subject::single(Engine::new(choice)?));
@@ -229,36 +230,4 @@ fn stress(bench: &Bench) -> Result<Vec<StressRun>, ReportError> {
         runs.push(StressRun { engine: index, outcomes });
     }
     Ok(runs)
-}
-
-/// Now, as `2026-11-23 14:05 UTC`, in the proleptic Gregorian calendar.
-fn date() -> String {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let [year, month, day] = civil(seconds / 86_400);
-    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
-    format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
-}
-
-/// Year, month and day of a day since 1970-01-01. Years begin in March here, so that the leap day is the last.
-fn civil(days: u64) -> [u64; 3] {
-    let days = days + 719_468; // since 0000-03-01
-    let (era, day_of_era) = (days / 146_097, days % 146_097);
-    let year = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year + year / 4 - year / 100);
-    let month = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month + 2) / 5 + 1;
-    let month = if month < 10 { month + 3 } else { month - 9 };
-    [year + era * 400 + u64::from(month <= 2), month, day]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn days_have_dates() {
-        assert_eq!(civil(0), [1970, 1, 1]);
-        assert_eq!(civil(11_016), [2000, 2, 29]);
-        assert_eq!(civil(20_780), [2026, 11, 23]);
-    }
 }
