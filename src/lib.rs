@@ -56,5 +56,6 @@ pub use recipe::{
     RecipeError, RecipeSettings, ScalarSampler, XyzScale,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
-pub use wgpu;
+// What stands in signatures, so that hosts take the same versions.
+pub use {half, nalgebra, rand, wgpu};
 pub use wgsl::WgslError;
