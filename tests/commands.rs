@@ -11,13 +11,11 @@
 //! they are [`KNOWN`], and an error if they are not; so is any syntax of the shell that is more than words, a
 //! continued line, a comment and a `>` at the end.
 
-mod program;
-
-use std::fs::{self, File};
+use std::env;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use program::{PROGRAM, python};
 use rayon::prelude::*;
 
 /// Programs whose lines are not run here, since they compile, install or need a cluster.
@@ -202,28 +200,28 @@ fn take(step: &Step, folder: &Path) -> Result<(), String> {
         Step::Leave(words) => left(words),
         Step::Write { name, text } => fs::write(folder.join(name), text).map_err(|e| format!("{name}: {e}")),
         Step::Python(code) => {
-            python(folder, code);
-            Ok(())
+            let python = env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+            finish(Command::new(python).args(["-W", "error", "-c", code]).current_dir(folder), "Python")
+                .map(drop)
         }
     }
 }
 
 fn run(arguments: &[String], output: Option<&str>, folder: &Path) -> Result<(), String> {
-    let mut command = Command::new(PROGRAM);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_spectroll"));
     command.args(arguments).current_dir(folder).envs(SLURM);
-    if let Some(name) = output {
-        let file = File::create(folder.join(name)).map_err(|e| format!("{name}: {e}"))?;
-        command.stdout(file);
-    }
-    let done = command.output().map_err(|e| e.to_string())?;
-    match done.status.success() {
-        true => Ok(()),
-        false => Err(format!(
-            "spectroll {}: {}, {}",
-            arguments.join(" "),
-            done.status,
-            String::from_utf8_lossy(&done.stderr).trim()
-        )),
+    let written = finish(&mut command, &format!("spectroll {}", arguments.join(" ")))?;
+    output.map_or(Ok(()), |name| fs::write(folder.join(name), written).map_err(|e| format!("{name}: {e}")))
+}
+
+/// What a command that must succeed writes to its standard output.
+fn finish(command: &mut Command, name: &str) -> Result<Vec<u8>, String> {
+    let done = command.output().map_err(|e| format!("{name}: {e}"))?;
+    let errors = String::from_utf8_lossy(&done.stderr);
+    if done.status.success() {
+        Ok(done.stdout)
+    } else {
+        Err(format!("{name}: {}, {}", done.status, errors.trim()))
     }
 }
 
