@@ -13,6 +13,8 @@ pub use error::RecipeError;
 pub use scalar::{Draw, ScalarSampler};
 pub use settings::RecipeSettings;
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use crate::colorimetry;
@@ -61,6 +63,38 @@ pub enum ProposalKind {
     Plain,
     /// Boxes that cover what is acceptable, for models of up to 12 components: right where next to nothing is.
     Cover,
+}
+
+/// The luminous reflectance value (LRV) that reflectances are scaled to: CIE Y of the 1931 2 degree observer under D65,
+/// 1 for a perfect white.
+///
+/// ```
+/// use spectroll::Lrv;
+///
+/// assert_eq!(Lrv::from(0.4), Lrv::Fixed(0.4));
+/// assert_eq!(Lrv::from(0.2..0.6), Lrv::Uniform(0.2, 0.6));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "settings::LrvRecord", into = "settings::LrvRecord")]
+pub enum Lrv {
+    /// The same for every draw.
+    Fixed(f64),
+    /// One of its own for each draw, uniform between the two. It belongs to the draw and not to a candidate: where the
+    /// scaled spectrum is bounded, a light target takes more candidates, and is as frequent as a dark one.
+    /// [`Quantity::Lrv`](crate::Quantity::Lrv) has it. The first must be below the second; in f32, either may come out.
+    Uniform(f64, f64),
+}
+
+impl From<f64> for Lrv {
+    fn from(lrv: f64) -> Lrv {
+        Lrv::Fixed(lrv)
+    }
+}
+
+impl From<Range<f64>> for Lrv {
+    fn from(range: Range<f64>) -> Lrv {
+        Lrv::Uniform(range.start, range.end)
+    }
 }
 
 /// What an illuminant is multiplied by.
@@ -136,7 +170,8 @@ impl Recipe {
         &self.settings
     }
 
-    /// The share of candidates that are accepted, estimated from 65,536 of them.
+    /// The share of candidates that are accepted, estimated from 65,536 of them, or from about as many in whole draws
+    /// where what is accepted depends on a target of the draw's own.
     pub fn acceptance(&self) -> f64 {
         self.acceptance
     }
