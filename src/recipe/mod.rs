@@ -260,6 +260,25 @@ mod tests {
             (surface.clone().lrv(f64::NAN), "NaN: it must be above 0 and below 1"),
             (surface.clone().lrv(0.0), "reflectance of 0:"),
             (surface.clone().lrv(0.996), "the largest is 0.995928"),
+            (surface.clone().lrv(0.6..0.2), "between 0.6 and 0.2: the first must be below the second"),
+            (surface.clone().lrv(0.4..0.4), "between 0.4 and 0.4: the first must be below the second"),
+            (surface.clone().lrv(0.4..f64::NAN), "NaN: it must be above 0 and below 1"),
+            (surface.clone().lrv(0.0..0.4), "reflectance of 0:"),
+            (surface.clone().lrv(0.2..1.5), "reflectance of 1.5:"),
+            (surface.clone().lrv(0.2..0.996), "the largest is 0.995928"),
+            (
+                surface.clone().lrv(0.2..0.995).bounds(Bounds::Scaled),
+                "upper end of target luminous reflectances between 0.2 and 0.995: none of 65536 was; lower that end",
+            ),
+            (
+                surface.clone().lrv(0.2..0.95).bounds(Bounds::Both).max_attempts(100),
+                "attempts, or lower that end",
+            ),
+            (
+                surface.clone().lrv(0.2..0.6).bounds(Bounds::Both).proposal(ProposalKind::Cover),
+                "no cover serves every target luminous reflectance between 0.2 and 0.6",
+            ),
+            (light.clone().lrv(0.2..0.5), "of illuminants"),
             (surface.clone().covariance_scale(f64::NAN), "finite and not negative"),
             (surface.clone().max_attempts(0), "at least 1 attempt"),
             (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
@@ -323,4 +342,15 @@ mod tests {
     }
 
     const FIRST: [u32; 3] = [1050670988, 1051942847, 1058168784];
+
+    #[test]
+    fn the_first_draw_with_a_target_of_its_own_stays_what_it_is() {
+        let recipe = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap()).lrv(0.2..0.6);
+        let recipe = recipe.bounds(Bounds::Scaled).quantities([Quantity::Spectra, Quantity::Lrv]).build();
+        let drawn = recipe.unwrap().draw::<f32>(Stream::new(1), 0);
+        let (spectrum, lrv) = (drawn.spectrum(), drawn.values(Quantity::Lrv)[0]);
+        assert_eq!([lrv, spectrum[0], spectrum[30]].map(f32::to_bits), FIRST_OF_ITS_OWN);
+    }
+
+    const FIRST_OF_ITS_OWN: [u32; 3] = [1058549709, 1057498696, 1064905033];
 }

@@ -231,6 +231,7 @@ mod tests {
             let format = ArrayFormat { quantity: Quantity::Lrv, dtype: Dtype::F32, ..ArrayFormat::status() };
             outputs.push(Output { format, source: Source::TargetLrv });
         }
+        outputs.sort_by_key(|output| output.format.quantity);
         Program { outputs, ..program }
     }
 
