@@ -12,7 +12,7 @@ use crate::engine::{Batch, DrawSummary, Engine, EngineError, Session};
 use crate::output::{Field, Schema, SharedArray, SpdName};
 use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::{DrawRange, Stream};
-use crate::recipe::Recipe;
+use crate::recipe::{Lrv, Recipe};
 
 /// Draws of a recipe that are to be written.
 #[derive(Clone, Debug)]
@@ -56,8 +56,8 @@ impl<'a> DrawExport<'a> {
     pub fn companions(&self) -> Companions {
         let spd = match (self.recipe.model().kind(), self.recipe.settings().lrv) {
             (SpectrumKind::Illuminant, _) => SpdName::Illuminant,
-            (SpectrumKind::Reflectance, None) => SpdName::Reflectance,
-            (SpectrumKind::Reflectance, Some(lrv)) => SpdName::ReflectanceAt(lrv),
+            (SpectrumKind::Reflectance, None | Some(Lrv::Uniform(..))) => SpdName::Reflectance,
+            (SpectrumKind::Reflectance, Some(Lrv::Fixed(lrv))) => SpdName::ReflectanceAt(lrv),
         };
         let files = vec![("_model.json", self.recipe.model().to_json())];
         Companions { spd: (spd, self.draws.first), files }

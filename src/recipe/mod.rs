@@ -13,6 +13,8 @@ pub use error::RecipeError;
 pub use scalar::{Draw, ScalarSampler};
 pub use settings::RecipeSettings;
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use crate::colorimetry;
@@ -61,6 +63,38 @@ pub enum ProposalKind {
     Plain,
     /// Boxes that cover what is acceptable, for models of up to 12 components: right where next to nothing is.
     Cover,
+}
+
+/// The luminous reflectance value (LRV) that reflectances are scaled to: CIE Y of the 1931 2 degree observer under D65,
+/// 1 for a perfect white.
+///
+/// ```
+/// use spectroll::Lrv;
+///
+/// assert_eq!(Lrv::from(0.4), Lrv::Fixed(0.4));
+/// assert_eq!(Lrv::from(0.2..0.6), Lrv::Uniform(0.2, 0.6));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "settings::LrvRecord", into = "settings::LrvRecord")]
+pub enum Lrv {
+    /// The same for every draw.
+    Fixed(f64),
+    /// One of its own for each draw, uniform between the two. It belongs to the draw and not to a candidate: where the
+    /// scaled spectrum is bounded, a light target takes more candidates, and is as frequent as a dark one.
+    /// [`Quantity::Lrv`](crate::Quantity::Lrv) has it. The first must be below the second; in f32, either may come out.
+    Uniform(f64, f64),
+}
+
+impl From<f64> for Lrv {
+    fn from(lrv: f64) -> Lrv {
+        Lrv::Fixed(lrv)
+    }
+}
+
+impl From<Range<f64>> for Lrv {
+    fn from(range: Range<f64>) -> Lrv {
+        Lrv::Uniform(range.start, range.end)
+    }
 }
 
 /// What an illuminant is multiplied by.
@@ -136,7 +170,8 @@ impl Recipe {
         &self.settings
     }
 
-    /// The share of candidates that are accepted, estimated from 65,536 of them.
+    /// The share of candidates that are accepted, estimated from 65,536 of them, or from about as many in whole draws
+    /// where what is accepted depends on a target of the draw's own.
     pub fn acceptance(&self) -> f64 {
         self.acceptance
     }
@@ -225,6 +260,25 @@ mod tests {
             (surface.clone().lrv(f64::NAN), "NaN: it must be above 0 and below 1"),
             (surface.clone().lrv(0.0), "reflectance of 0:"),
             (surface.clone().lrv(0.996), "the largest is 0.995928"),
+            (surface.clone().lrv(0.6..0.2), "between 0.6 and 0.2: the first must be below the second"),
+            (surface.clone().lrv(0.4..0.4), "between 0.4 and 0.4: the first must be below the second"),
+            (surface.clone().lrv(0.4..f64::NAN), "NaN: it must be above 0 and below 1"),
+            (surface.clone().lrv(0.0..0.4), "reflectance of 0:"),
+            (surface.clone().lrv(0.2..1.5), "reflectance of 1.5:"),
+            (surface.clone().lrv(0.2..0.996), "the largest is 0.995928"),
+            (
+                surface.clone().lrv(0.2..0.995).bounds(Bounds::Scaled),
+                "upper end of target luminous reflectances between 0.2 and 0.995: none of 65536 was; lower that end",
+            ),
+            (
+                surface.clone().lrv(0.2..0.95).bounds(Bounds::Both).max_attempts(100),
+                "attempts, or lower that end",
+            ),
+            (
+                surface.clone().lrv(0.2..0.6).bounds(Bounds::Both).proposal(ProposalKind::Cover),
+                "no cover serves every target luminous reflectance between 0.2 and 0.6",
+            ),
+            (light.clone().lrv(0.2..0.5), "of illuminants"),
             (surface.clone().covariance_scale(f64::NAN), "finite and not negative"),
             (surface.clone().max_attempts(0), "at least 1 attempt"),
             (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
@@ -288,4 +342,15 @@ mod tests {
     }
 
     const FIRST: [u32; 3] = [1050670988, 1051942847, 1058168784];
+
+    #[test]
+    fn the_first_draw_with_a_target_of_its_own_stays_what_it_is() {
+        let recipe = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap()).lrv(0.2..0.6);
+        let recipe = recipe.bounds(Bounds::Scaled).quantities([Quantity::Spectra, Quantity::Lrv]).build();
+        let drawn = recipe.unwrap().draw::<f32>(Stream::new(1), 0);
+        let (spectrum, lrv) = (drawn.spectrum(), drawn.values(Quantity::Lrv)[0]);
+        assert_eq!([lrv, spectrum[0], spectrum[30]].map(f32::to_bits), FIRST_OF_ITS_OWN);
+    }
+
+    const FIRST_OF_ITS_OWN: [u32; 3] = [1058549709, 1057498696, 1064905033];
 }

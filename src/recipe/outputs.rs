@@ -5,7 +5,7 @@ use crate::affine::Affine;
 use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::model::Model;
-use crate::program::{Output, Program, Source, Unit};
+use crate::program::{LrvLaw, Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity};
 
 /// What a recipe asks for.
@@ -62,7 +62,7 @@ pub(crate) fn outputs(
         let width = match &source {
             Source::Spectrum => program.bands(),
             Source::Map(map, _) => map.offset.len(),
-            Source::Intensity | Source::Status => 1,
+            Source::Intensity | Source::TargetLrv | Source::Status => 1,
         };
         let dtype = match quantity {
             Quantity::Spectra => asked.spectra,
@@ -104,7 +104,10 @@ fn source(
             (_, SpectrumKind::Illuminant) => {
                 return Err(unless("illuminants have no luminous reflectance"));
             }
-            (Some(target), _) => Source::Map(Affine::constant(target.lrv, k), Unit::One),
+            (Some(target), _) => match target.lrv {
+                LrvLaw::Fixed(lrv) => Source::Map(Affine::constant(lrv, k), Unit::One),
+                LrvLaw::Uniform { .. } => Source::TargetLrv,
+            },
             (None, _) => {
                 let grid = model.grid();
                 let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;

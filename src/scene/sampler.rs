@@ -258,3 +258,15 @@ fn filled(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wg
     let contents = if bytes.is_empty() { &[0; 4] } else { bytes };
     device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{COPIES, Sizes};
+    use crate::wgsl::layout::{assert_layout, offsets};
+
+    #[test]
+    fn sizes_lie_as_the_shader_reads_them() {
+        let members = offsets!(Sizes: values, bands, copies, lights);
+        assert_layout(COPIES, "Sizes", &members, size_of::<Sizes>());
+    }
+}

@@ -84,6 +84,9 @@ fn interface(program: &Program) -> String {
             Source::Intensity => text.block(&format!("fn {quantity}(d: Draw) -> f32"), |body| {
                 body.line("return d.scale;");
             }),
+            Source::TargetLrv => text.block(&format!("fn {quantity}(d: Draw) -> f32"), |body| {
+                body.line("return d.target_lrv;");
+            }),
             Source::Status => {} // it is in the Draw
         }
     }
