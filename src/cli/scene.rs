@@ -15,7 +15,7 @@ use spectroll::scene::{GroupSummary, PRESETS, Scene, Workload};
 use super::exit::Usage;
 use super::interrupt;
 use super::options::{EngineArguments, OutputArguments};
-use super::parse::{grouped, size};
+use super::parse::{grouped, seed, size};
 use super::picture;
 use super::picture::scene::Preview;
 use super::run::{self, free, room};
@@ -34,6 +34,9 @@ pub(crate) struct Arguments {
     /// Use a built-in scene file; without -o, --preview or --dry-run, print it
     #[arg(long, value_name = "NAME", value_parser = PRESETS.map(|(name, _)| name))]
     example: Option<String>,
+    /// Draw with this seed instead of the file's; random takes one from the operating system
+    #[arg(long, value_name = "N|random", value_parser = seed, allow_negative_numbers = true)]
+    seed: Option<u64>,
     /// Draw this group alone
     #[arg(long, value_name = "GROUP")]
     only: Option<String>,
@@ -89,7 +92,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let folder = arguments.file.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
     let selection = ArraySelection { only: arguments.only.clone(), arrays: arguments.arrays.clone() };
-    let scene = selection.apply(Scene::parse(&name, &text, folder)?)?;
+    let scene = selection.apply(match arguments.seed {
+        Some(seed) => Scene::parse_seeded(&name, &text, folder, seed)?,
+        None => Scene::parse(&name, &text, folder)?,
+    })?;
     let scenes = arguments.scenes.clone().unwrap_or(0..scene.scenes());
     if scenes.end > scene.scenes() {
         let all = scene.scenes();
@@ -112,7 +118,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     match (made, picture) {
         (Some(made), picture) => job.run(&engine, made, picture),
-        (None, Some(picture)) => picture.make(&job, &engine),
+        (None, Some(picture)) => {
+            picture.make(&job, &engine)?;
+            job.tell_seed();
+            Ok(())
+        }
         (None, None) => Ok(()),
     }
 }
@@ -180,6 +190,13 @@ impl Job<'_> {
         Ok((output, schema))
     }
 
+    /// Says what the seed is where it is not that of the file.
+    fn tell_seed(&self) {
+        if self.arguments.seed.is_some() && !self.arguments.quiet && !self.arguments.json {
+            tell!("  seed {}", self.scene.seed());
+        }
+    }
+
     /// A picture of these scenes at `path`, if it can be written.
     fn picture<'p>(&self, path: &'p Path) -> anyhow::Result<Picture<'p>> {
         let format = picture::format(path)?;
@@ -237,6 +254,7 @@ impl Job<'_> {
                     tell!("    {} of them reach 1 or more after scaling", grouped(summary.above_one));
                 }
             }
+            self.tell_seed();
             tell!("  {seconds:.2} s, {}", report.engine);
             if let SetStatus::Waiting { done, chunks } = outcome {
                 tell!("  {} of {} chunks are finished", grouped(done), grouped(chunks));

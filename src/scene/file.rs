@@ -59,6 +59,15 @@ impl Scene {
     /// assert!(error.starts_with(r#"wall.toml, line 5, cuont of "wall": there is no such key, did you mean "count"?"#));
     /// ```
     pub fn parse(name: &str, text: &str, folder: &Path) -> Result<Scene, SceneError> {
+        Scene::read(name, text, folder, None)
+    }
+
+    /// Reads the text of a scene file, whose scenes are to be drawn with another seed than it says.
+    pub fn parse_seeded(name: &str, text: &str, folder: &Path, seed: u64) -> Result<Scene, SceneError> {
+        Scene::read(name, text, folder, Some(seed))
+    }
+
+    fn read(name: &str, text: &str, folder: &Path, seed: Option<u64>) -> Result<Scene, SceneError> {
         let error = |span: Option<Range<usize>>, group: Option<String>, key: String, problem| {
             let line = span.map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
             SceneError::new(SceneErrorPlace { file: Some(name.to_owned()), line, group, key }, problem)
@@ -66,9 +75,10 @@ impl Scene {
         let table = DeTable::parse(text).map_err(|e| {
             error(e.span(), None, String::new(), SceneErrorKind::Syntax(e.message().replace('\n', "; ")))
         })?;
-        let file = Reader { folder, models: HashMap::new() }
+        let mut file = Reader { folder, models: HashMap::new() }
             .scene(table.get_ref())
             .map_err(|wrong| error(Some(wrong.span), wrong.group, wrong.key, *wrong.problem))?;
+        file.builder.seed = seed.unwrap_or(file.builder.seed);
         file.builder.checked().map_err(|fault| {
             let spans = fault.group.map_or(&file.spans, |group| &file.groups[group].spans);
             let own = spans.iter().find(|(key, _)| *key == fault.key).map(|(_, span)| span.clone());
