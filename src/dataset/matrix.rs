@@ -16,10 +16,28 @@ pub(super) struct Matrix {
     pub(super) values: Vec<f64>,
 }
 
+/// What a file holds.
+#[derive(Default)]
+pub(super) struct Matrices {
+    /// Its numeric arrays.
+    pub(super) all: Vec<Matrix>,
+    /// The text of its variable [`COMMENT`].
+    pub(super) comment: Option<String>,
+}
+
+/// The variable in which data sets of this program say what they were made from, in JSON.
+pub(super) const COMMENT: &str = "comment";
+
+/// What the comment of a data set of this program says that its draws are.
+fn kind(comment: &str) -> Option<SpectrumKind> {
+    let mut attributes: serde_json::Value = serde_json::from_str(comment).ok()?;
+    serde_json::from_value(attributes.get_mut("kind")?.take()).ok()
+}
+
 /// The table of the matrix that `variable` names, or of the only one with its sampling beside it.
 pub(super) fn choose(
     path: &Path,
-    matrices: &[Matrix],
+    Matrices { all: matrices, comment }: &Matrices,
     variable: Option<&str>,
 ) -> Result<Table, DatasetError> {
     let mut samplings: Vec<_> = matrices.iter().filter_map(sampling).collect();
@@ -31,7 +49,7 @@ pub(super) fn choose(
         .filter_map(|m| Some((m, grid_of(m, &samplings)?)))
         .filter(|(m, _)| variable.is_none_or(|v| v == m.name))
         .collect();
-    let found = || match matrices {
+    let found = || match matrices.as_slice() {
         [] => "no numeric matrix".to_owned(),
         all => all
             .iter()
@@ -41,7 +59,13 @@ pub(super) fn choose(
     };
     let path = path.to_owned();
     match (spectra.as_slice(), variable) {
-        ([(matrix, grid)], _) => table(&format!("{path:?}:{}", matrix.name), matrix, *grid),
+        ([(matrix, grid)], _) => {
+            let mut table = table(&format!("{path:?}:{}", matrix.name), matrix, *grid)?;
+            // The draws of a data set are called X whatever they are.
+            let of_draws = comment.as_deref().filter(|_| matrix.name == "X").and_then(kind);
+            table.kind = table.kind.or(of_draws);
+            Ok(table)
+        }
         ([], None) => Err(DatasetError::NoMatrix { path, found: found() }),
         ([], Some(v)) => Err(DatasetError::NoVariable { path, variable: v.to_owned(), found: found() }),
         (several, _) => {
