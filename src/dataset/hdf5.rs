@@ -14,7 +14,9 @@ use super::{DatasetError, MAX_BYTES};
 pub(super) fn matrices(path: &Path) -> Result<Matrices, DatasetError> {
     let failed = |e: Hdf5Error| DatasetError::Hdf5 { path: path.to_owned(), reason: e.to_string() };
     let file = H5File::options().no_locking().open(path).map_err(failed)?;
-    let mut matrices = Matrices::default();
+    let recorded = file.attr_string("kind").ok();
+    let kind = recorded.and_then(|kind| serde_json::from_value(kind.into()).ok());
+    let mut matrices = Matrices { kind, ..Matrices::default() };
     let mut left = MAX_BYTES as usize / size_of::<f64>();
     for name in file.dataset_names() {
         let set = file.dataset(&name).map_err(failed)?;
@@ -34,7 +36,7 @@ pub(super) fn matrices(path: &Path) -> Result<Matrices, DatasetError> {
         let name = name.trim_start_matches('/').to_owned();
         if name == matrix::COMMENT {
             let units: Vec<u16> = values.iter().map(|&unit| unit as u16).collect();
-            matrices.comment = String::from_utf16(&units).ok();
+            matrices.kind = String::from_utf16(&units).ok().and_then(|text| matrix::kind(&text));
             continue;
         }
         let matrix = Matrix { name, rows, columns, values };

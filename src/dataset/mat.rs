@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], variable: Option<&str>) -> Result<
     matrix::choose(path, &matrices, variable)
 }
 
-/// Every real numeric matrix of the file, in order, and its comment.
+/// Every real numeric matrix of the file, in order, and what its comment says.
 fn matrices(path: &Path, bytes: &[u8]) -> Result<Matrices, DatasetError> {
     let failed = |reason: &str| DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() };
     let little_endian = endianness(bytes).map_err(failed)?;
@@ -57,7 +57,7 @@ fn matrices(path: &Path, bytes: &[u8]) -> Result<Matrices, DatasetError> {
             matrices.all.extend(decode(&bytes[..HEADER], element));
         } else if word(element, 4).is_some_and(|flags| flags & 0xFF == CHAR) {
             let text = text(element, word).filter(|(name, _)| name == matrix::COMMENT);
-            matrices.comment = text.map(|(_, text)| text).or(matrices.comment);
+            matrices.kind = text.and_then(|(_, text)| matrix::kind(&text)).or(matrices.kind);
         }
         rest = &rest[8 + size..];
         if kind != COMPRESSED {

@@ -21,15 +21,18 @@ pub(super) struct Matrix {
 pub(super) struct Matrices {
     /// Its numeric arrays.
     pub(super) all: Vec<Matrix>,
-    /// The text of its variable [`COMMENT`].
-    pub(super) comment: Option<String>,
+    /// The kind of the draws, where it is a data set of this program.
+    pub(super) kind: Option<SpectrumKind>,
 }
 
 /// The variable in which data sets of this program say what they were made from, in JSON.
 pub(super) const COMMENT: &str = "comment";
 
-/// What the comment of a data set of this program says that its draws are.
-fn kind(comment: &str) -> Option<SpectrumKind> {
+/// The names of draws in data sets of this program.
+const DRAWS: [&str; 2] = ["X", "spectra"];
+
+/// The kind that the comment of a data set of this program records.
+pub(super) fn kind(comment: &str) -> Option<SpectrumKind> {
     let mut attributes: serde_json::Value = serde_json::from_str(comment).ok()?;
     serde_json::from_value(attributes.get_mut("kind")?.take()).ok()
 }
@@ -37,7 +40,7 @@ fn kind(comment: &str) -> Option<SpectrumKind> {
 /// The table of the matrix that `variable` names, or of the only one with its sampling beside it.
 pub(super) fn choose(
     path: &Path,
-    Matrices { all: matrices, comment }: &Matrices,
+    Matrices { all: matrices, kind }: &Matrices,
     variable: Option<&str>,
 ) -> Result<Table, DatasetError> {
     let mut samplings: Vec<_> = matrices.iter().filter_map(sampling).collect();
@@ -61,9 +64,7 @@ pub(super) fn choose(
     match (spectra.as_slice(), variable) {
         ([(matrix, grid)], _) => {
             let mut table = table(&format!("{path:?}:{}", matrix.name), matrix, *grid)?;
-            // The draws of a data set are called X whatever they are.
-            let of_draws = comment.as_deref().filter(|_| matrix.name == "X").and_then(kind);
-            table.kind = table.kind.or(of_draws);
+            table.kind = table.kind.or(kind.filter(|_| DRAWS.contains(&matrix.name.as_str())));
             Ok(table)
         }
         ([], None) => Err(DatasetError::NoMatrix { path, found: found() }),
