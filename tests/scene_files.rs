@@ -132,7 +132,12 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
             "quantities = [\"lrv\"]",
             &["line 8, quantities of \"lights\"", "no \"lrv\""],
         ),
-        ("target", "quantities", "quantities = []", &["line 16, quantities of \"target\"", "name one at least"]),
+        (
+            "target",
+            "quantities",
+            "quantities = []",
+            &["line 16, quantities of \"target\"", "name one at least"],
+        ),
         ("target", "quantities", "quantities = \"xyz\"", &["line 16, quantities", "a list, as in"]),
         ("surface", "max_attempts", "max_attempts = 0", &["line 12, max_attempts", "at least 1 attempt"]),
         (

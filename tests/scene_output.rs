@@ -73,11 +73,9 @@ fn a_folder_of_text_has_every_group_and_what_is_fixed_once() {
             "scene-0011-luminance-0.6000-reflectance-002.spd"
         ]
     );
-    for (array, group, shape) in [
-        ("lights", "lights", [2, 2]),
-        ("target", "target", [2, 2]),
-        ("back-wall", "back-wall", [1, 3]),
-    ] {
+    for (array, group, shape) in
+        [("lights", "lights", [2, 2]), ("target", "target", [2, 2]), ("back-wall", "back-wall", [1, 3])]
+    {
         succeeds(folder, &format!("{scene} --arrays {array} -o one.npy --force"));
         let (_, values) = program::npy(&folder.join("one.npy"));
         let names = inner(group);
@@ -100,7 +98,10 @@ fn a_folder_of_text_replaces_only_one_of_its_kind() {
     let (_, summary) =
         succeeds(folder, "scene mine.toml --engine cpu --scenes 0..1 --only target -o rooms.spd");
     assert!(summary.contains("rooms.spd: a folder of 2 files"), "{summary}");
-    succeeds(folder, "scene mine.toml --engine cpu --scenes 0..1 --only target -o rooms --format spd --force");
+    succeeds(
+        folder,
+        "scene mine.toml --engine cpu --scenes 0..1 --only target -o rooms --format spd --force",
+    );
     assert_eq!(files(&folder.join("rooms")), ["target"]);
     fs::write(folder.join("rooms/notes.txt"), "mine").unwrap();
     fails(folder, &format!("{rooms} --force"), 1, "is not a folder of .spd files of this program alone");
@@ -202,7 +203,12 @@ fn another_seed_is_recorded() {
     let drawn = summary.split_once("  seed ").unwrap().1.lines().next().unwrap();
     assert_eq!(python(folder, code), drawn);
     assert!(drawn.parse::<u64>().unwrap() > 1 << 32, "one in 2^32 is not");
-    fails(folder, &format!("{scene} --seed chance -o d.npz"), 2, "a whole number from 0 to 2^64 - 1, or random");
+    fails(
+        folder,
+        &format!("{scene} --seed chance -o d.npz"),
+        2,
+        "a whole number from 0 to 2^64 - 1, or random",
+    );
     // A set is drawn again with the seed that it was drawn with.
     succeeds(folder, &format!("{scene} --seed 8 -o e.zarr"));
     succeeds(folder, "verify e.zarr --redraw 1 --engine cpu");
@@ -212,7 +218,8 @@ fn another_seed_is_recorded() {
 fn colours_have_arrays_of_their_own() {
     let (folder, scene) = scene();
     let folder = folder.path();
-    let asks = |text: &str, list: &str| text.replace("fixed = true", &format!("fixed = true\nquantities = {list}"));
+    let asks =
+        |text: &str, list: &str| text.replace("fixed = true", &format!("fixed = true\nquantities = {list}"));
     fs::write(folder.join("mine.toml"), asks(SCENE, r#"["xyz", "chromaticity", "linear_srgb"]"#)).unwrap();
     succeeds(folder, &format!("{scene} -o a.npz"));
     let code = "import numpy as np; a = np.load('a.npz')\n\
@@ -229,5 +236,8 @@ fn colours_have_arrays_of_their_own() {
     assert_eq!(files(&folder.join("rooms.spd")), ["lights", "target"]);
     fails(folder, &format!("{scene} --preview a.png"), 2, "add \"spectra\" to its quantities");
     let (plan, _) = succeeds(folder, &format!("{scene} --dry-run"));
-    assert!(plan.contains("back-wall: its spectra are not stored, for quantities does not name them"), "{plan}");
+    assert!(
+        plan.contains("back-wall: its spectra are not stored, for quantities does not name them"),
+        "{plan}"
+    );
 }

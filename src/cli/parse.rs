@@ -26,7 +26,9 @@ pub(super) fn count(text: &str) -> Result<u64, String> {
 pub(super) fn seed(text: &str) -> Result<u64, String> {
     match text {
         "random" => getrandom::u64().map_err(|e| format!("the operating system gives no random number: {e}")),
-        number => number.parse().map_err(|_| "expected a whole number from 0 to 2^64 - 1, or random".to_owned()),
+        number => {
+            number.parse().map_err(|_| "expected a whole number from 0 to 2^64 - 1, or random".to_owned())
+        }
     }
 }
 

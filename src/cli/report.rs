@@ -129,7 +129,8 @@ fn write(folder: &PendingFolder, report: &Report) -> anyhow::Result<()> {
 }
 
 /// What tells a folder of ours from others, which `--force` must not remove.
-const REPORT: FolderMark = FolderMark { name: "a report", is_ours: |path| path.join("report.json").is_file() };
+const REPORT: FolderMark =
+    FolderMark { name: "a report", is_ours: |path| path.join("report.json").is_file() };
 
 #[cfg(test)]
 mod tests {

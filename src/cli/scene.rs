@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde::Serialize;
-use spectroll::{Engine, Quantity};
 use spectroll::evaluation::plot::PictureFormat;
 use spectroll::export::{ArraySelection, Companions, ExportError, Output, SceneExport, Writing};
 use spectroll::output::{PendingFile, Schema, SetStatus};
 use spectroll::scene::{GroupSummary, PRESETS, Scene, Workload};
+use spectroll::{Engine, Quantity};
 
 use super::exit::Usage;
 use super::interrupt;

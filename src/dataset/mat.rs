@@ -143,7 +143,9 @@ fn text(element: &[u8], word: impl Fn(&[u8], usize) -> Option<u32>) -> Option<(S
         kind if BYTES.contains(&kind) => String::from_utf8(bytes.to_vec()).ok()?,
         kind if UTF16.contains(&kind) => {
             let is_little = word(&[1, 0, 0, 0], 0) == Some(1);
-            let unit = |pair: &[u8; 2]| if is_little { u16::from_le_bytes(*pair) } else { u16::from_be_bytes(*pair) };
+            let unit = |pair: &[u8; 2]| {
+                if is_little { u16::from_le_bytes(*pair) } else { u16::from_be_bytes(*pair) }
+            };
             String::from_utf16(&bytes.as_chunks().0.iter().map(unit).collect::<Vec<_>>()).ok()?
         }
         _ => return None,

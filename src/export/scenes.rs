@@ -9,8 +9,8 @@ use serde_json::{Map, Value, json};
 
 use super::provenance::{Sum, model_sum};
 use super::{Companions, Destination, ExportError, Output, Rows, Window, Writing};
-use crate::engine::{Engine, EngineError};
 use crate::dataset::SpectrumKind;
+use crate::engine::{Engine, EngineError};
 use crate::output::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
 use crate::quantity::Quantity;
 use crate::scene::{Array, GroupKind, GroupSummary, Scene, SceneSession};

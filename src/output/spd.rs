@@ -151,8 +151,7 @@ pub(super) fn holds(schema: &Schema, spectra: &[SpectraArray]) -> bool {
     let names = schema.fields.iter().map(|field| &field.name);
     let mut names = names.chain(schema.shared.iter().map(|shared| &shared.name));
     let is_spectra = |name: &String| spectra.iter().any(|array| array.name == *name);
-    let is_label =
-        |name: &String| spectra.iter().any(|array| array.lrv == LrvLabel::Field(name.clone()));
+    let is_label = |name: &String| spectra.iter().any(|array| array.lrv == LrvLabel::Field(name.clone()));
     names.clone().any(is_spectra) && names.all(|name| is_spectra(name) || is_label(name))
 }
 

@@ -238,7 +238,10 @@ mod tests {
             (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
             (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
             (surface.clone().bounds(Bounds::Both), "without a target luminous reflectance"),
-            (surface.clone().illuminant(Illuminant::E), "without XYZ, chromaticity or linear sRGB of reflectances"),
+            (
+                surface.clone().illuminant(Illuminant::E),
+                "without XYZ, chromaticity or linear sRGB of reflectances",
+            ),
             (surface.clone().xyz_scale(XyzScale::UnitY).quantities([Quantity::Xyz]), "of illuminants"),
         ] {
             let text = message(recipe);

@@ -247,8 +247,10 @@ impl Reader<'_> {
         };
         let quantities = match section.get("quantities") {
             None => vec![Quantity::Spectra],
-            Some(entry) => entry
-                .choices(&QUANTITIES.map(|quantity| (quantity.name(), quantity)), "a list, as in [\"spectra\", \"xyz\"]")?,
+            Some(entry) => entry.choices(
+                &QUANTITIES.map(|quantity| (quantity.name(), quantity)),
+                "a list, as in [\"spectra\", \"xyz\"]",
+            )?,
         };
         Ok(Base { name: name.to_owned(), model, count, covariance_scale, max_attempts, quantities })
     }

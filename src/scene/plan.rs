@@ -184,8 +184,7 @@ impl GroupPlan {
                 if base.quantities.iter().any(|quantity| Quantity::COLOURS.contains(quantity)) {
                     let invisible = || SceneErrorKind::Recipe(RecipeError::Invisible(grid));
                     let weights = colorimetry::xyz_weights(grid);
-                    observer =
-                        Some(Observer(weights.ok_or_else(|| fault("wavelengths", invisible()))?));
+                    observer = Some(Observer(weights.ok_or_else(|| fault("wavelengths", invisible()))?));
                 }
                 (GroupKind::Target, Shapes::Target(Box::new(target)), None)
             }

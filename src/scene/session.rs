@@ -230,9 +230,8 @@ pub(super) fn columns<'a>(
             let attempts: &[u32] = bytemuck::cast_slice(batch.bytes(Quantity::Attempts));
             let copies = (plan.count / drawing.places) as usize;
             let formats = drawing.recipe.formats().into_iter();
-            let values = formats.map(|format| {
-                (format.quantity, copied(batch.values(format.quantity), format.width, copies))
-            });
+            let values = formats
+                .map(|format| (format.quantity, copied(batch.values(format.quantity), format.width, copies)));
             Columns { values: values.collect(), attempts: copied(attempts, 1, copies) }
         }
         (_, Some(once), _) => {

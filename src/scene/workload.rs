@@ -67,7 +67,10 @@ impl Scene {
             left_out.extend(spared(plan));
             if !plan.gives(Quantity::Spectra) {
                 let drawn = if plan.drawn_by_engine().is_some() { "neither computed nor" } else { "not" };
-                left_out.push(format!("{}: its spectra are {drawn} stored, for quantities does not name them", plan.name));
+                left_out.push(format!(
+                    "{}: its spectra are {drawn} stored, for quantities does not name them",
+                    plan.name
+                ));
             }
             let (draws_per_scene, draws_once) = draws(plan);
             groups.push(GroupWorkload {

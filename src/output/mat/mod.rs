@@ -163,13 +163,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let spectra: Vec<f32> = (0..7 * BANDS).map(|i| i as f32 / 8.0).collect();
         let lrv: Vec<f32> = (0..7).map(|i| i as f32).collect();
-        let fields = vec![
-            Field::vector("spectra", "wavelength", BANDS, Dtype::F32),
-            Field::scalar("lrv", Dtype::F32),
-        ];
+        let fields =
+            vec![Field::vector("spectra", "wavelength", BANDS, Dtype::F32), Field::scalar("lrv", Dtype::F32)];
         let schema = schema(fields, Vec::new(), "draw", 7);
         let contents = named(&schema, &[array("spectra", None, SpectrumKind::Illuminant)]);
-        let (a, b) = (bytemuck::cast_slice(&spectra[..3 * BANDS]), bytemuck::cast_slice(&spectra[3 * BANDS..]));
+        let (a, b) =
+            (bytemuck::cast_slice(&spectra[..3 * BANDS]), bytemuck::cast_slice(&spectra[3 * BANDS..]));
         let (c, d) = (bytemuck::cast_slice(&lrv[..3]), bytemuck::cast_slice(&lrv[3..]));
         let mut versions = vec![("MATLAB 5.0 MAT-file", V5_BYTES)];
         if cfg!(feature = "hdf5") {
@@ -193,7 +192,8 @@ mod tests {
     fn groups_of_scenes_have_names_of_their_own() {
         let folder = tempfile::tempdir().unwrap();
         let values: Vec<f32> = (0..2 * 3 * BANDS).map(|i| i as f32 / 64.0).collect();
-        let field = Field::vector("back-wall", "wavelength", BANDS, Dtype::F32).repeated("back-wall_number", 3);
+        let field =
+            Field::vector("back-wall", "wavelength", BANDS, Dtype::F32).repeated("back-wall_number", 3);
         let lights: Vec<f32> = (0..2 * BANDS).map(|i| 1.0 + i as f32).collect();
         let shared = SharedArray {
             name: "lights".to_owned(),
