@@ -24,6 +24,8 @@ pub enum Quantity {
     Attempts,
     /// What an illuminant was multiplied by.
     Intensity,
+    /// CIE 1931 chromaticity x and y, of the tristimulus values, whatever their scale.
+    Chromaticity,
 }
 
 impl Quantity {
@@ -36,7 +38,11 @@ impl Quantity {
         Quantity::Lrv,
         Quantity::Attempts,
         Quantity::Intensity,
+        Quantity::Chromaticity,
     ];
+
+    /// Those that tristimulus values give.
+    pub(crate) const COLOURS: &[Quantity] = &[Quantity::Xyz, Quantity::LinearSrgb, Quantity::Chromaticity];
 
     /// How many there are.
     pub(crate) const COUNT: usize = Quantity::ALL.len();
@@ -46,7 +52,7 @@ impl Quantity {
         match self {
             Quantity::Spectra => Some("wavelength"),
             Quantity::Weights => Some("component"),
-            Quantity::Xyz | Quantity::LinearSrgb => Some("channel"),
+            Quantity::Xyz | Quantity::LinearSrgb | Quantity::Chromaticity => Some("channel"),
             Quantity::Lrv | Quantity::Attempts | Quantity::Intensity => None,
         }
     }
@@ -56,6 +62,7 @@ impl Quantity {
         match self {
             Quantity::Xyz => &["X", "Y", "Z"],
             Quantity::LinearSrgb => &["R", "G", "B"],
+            Quantity::Chromaticity => &["x", "y"],
             _ => &[],
         }
     }
@@ -70,6 +77,7 @@ impl Quantity {
             Quantity::Lrv => "lrv",
             Quantity::Attempts => "attempts",
             Quantity::Intensity => "intensity",
+            Quantity::Chromaticity => "chromaticity",
         }
     }
 }

@@ -227,11 +227,13 @@ fn values_are_those_of_f64() {
                 xyz = xyz.map(|v| v / xyz[1]);
             }
             let srgb = colorimetry::linear_srgb(xyz);
+            let chromaticity = [0, 1].map(|i| xyz[i] / xyz.iter().sum::<f64>());
             for format in recipe.formats() {
                 let quantity = format.quantity;
                 let expected = match quantity {
                     Quantity::Xyz => &xyz[..],
                     Quantity::LinearSrgb => &srgb[..],
+                    Quantity::Chromaticity => &chromaticity[..],
                     _ => exact.values(quantity),
                 };
                 let peak = match quantity {

@@ -68,7 +68,7 @@ impl RecipeBuilder {
         self
     }
 
-    /// The illuminant under which reflectances have their XYZ and linear sRGB ([`Illuminant::D65`]).
+    /// The illuminant under which reflectances have their XYZ, chromaticity and linear sRGB ([`Illuminant::D65`]).
     pub fn illuminant(mut self, illuminant: Illuminant) -> Self {
         self.outputs.illuminant = Some(illuminant);
         self

@@ -110,7 +110,7 @@ pub enum Intensity {
     Data,
 }
 
-/// The illuminant that reflectances have their XYZ and linear sRGB under.
+/// The illuminant that reflectances have their XYZ, chromaticity and linear sRGB under.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Illuminant {
@@ -220,7 +220,8 @@ impl Recipe {
     ///   `PREFIX_draw_in(stream, seed, index)` makes that of a [`Stream`] by its number.
     /// - for spectra, `PREFIX_at(draw, band) -> f32` and `PREFIX_spectrum(draw) -> array<f32, bands>`;
     /// - for weights, `PREFIX_weights(draw) -> array<f32, components>`;
-    /// - for XYZ and sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_srgb`;
+    /// - for XYZ and linear sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_linear_srgb`;
+    /// - for chromaticity, `PREFIX_chromaticity(draw) -> vec2<f32>`;
     /// - for LRV and intensity, `PREFIX_lrv(draw) -> f32` and `PREFIX_intensity`.
     ///
     /// The module needs no optional feature. To import it with `naga_oil`, put a line `#define_import_path NAME` before
@@ -230,7 +231,7 @@ impl Recipe {
     /// use spectroll::{Model, Quantity, Recipe};
     ///
     /// let recipe = Recipe::builder(&Model::builtin("granada")?).quantities([Quantity::LinearSrgb]).build()?;
-    /// assert!(recipe.wgsl("lamp")?.contains("fn lamp_srgb(d: lamp_Draw) -> vec3<f32>"));
+    /// assert!(recipe.wgsl("lamp")?.contains("fn lamp_linear_srgb(d: lamp_Draw) -> vec3<f32>"));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn wgsl(&self, prefix: &str) -> Result<String, WgslError> {
@@ -291,7 +292,10 @@ mod tests {
             (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
             (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
             (surface.clone().bounds(Bounds::Both), "without a target luminous reflectance"),
-            (surface.clone().illuminant(Illuminant::E), "without XYZ or linear sRGB of reflectances"),
+            (
+                surface.clone().illuminant(Illuminant::E),
+                "without XYZ, chromaticity or linear sRGB of reflectances",
+            ),
             (surface.clone().xyz_scale(XyzScale::UnitY).quantities([Quantity::Xyz]), "of illuminants"),
         ] {
             let text = message(recipe);

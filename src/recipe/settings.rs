@@ -28,7 +28,7 @@ pub struct RecipeSettings {
     pub intensity: Option<Intensity>,
     /// The quantities of each draw.
     pub quantities: Vec<Quantity>,
-    /// The illuminant of reflectances' XYZ and linear sRGB.
+    /// The illuminant of reflectances' XYZ, chromaticity and linear sRGB.
     pub illuminant: Illuminant,
     /// The scale of illuminants' XYZ and linear sRGB.
     pub xyz_scale: XyzScale,

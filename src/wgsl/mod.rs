@@ -242,6 +242,21 @@ mod tests {
         program
     }
 
+    /// The program with chromaticities alone.
+    fn chromaticity(program: Program) -> Program {
+        let n = program.bands();
+        let xyz = program.spectrum.project(&[vec![0.5; n], vec![0.25; n], vec![0.125; n]]);
+        let map = xyz.project(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let format = ArrayFormat {
+            quantity: Quantity::Chromaticity,
+            dtype: Dtype::F32,
+            width: map.offset.len(),
+            layout: Layout::Rows,
+        };
+        let sum = Unit::Over(xyz.project(&[[1.0; 3]]));
+        Program { outputs: vec![Output { format, source: Source::Map(map, sum) }], ..program }
+    }
+
     fn validate(text: &str, capabilities: Capabilities) -> Result<(), String> {
         let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
         let mut validator = Validator::new(ValidationFlags::all(), capabilities);
@@ -270,7 +285,8 @@ mod tests {
                 [Dtype::F32, Dtype::F16].map(|spectra| with_all(program.clone(), layout, spectra))
             })
         });
-        all.chain(programs).collect()
+        let colours: Vec<_> = programs.iter().cloned().map(chromaticity).collect();
+        all.chain(programs).chain(colours).collect()
     }
 
     #[test]
@@ -344,6 +360,7 @@ mod tests {
             ("weights", only(surface(None), Quantity::Weights), Dialect::Baseline),
             ("xyz", only(surface(None), Quantity::Xyz), Dialect::Baseline),
             ("xyz_of_illuminant", only(light(), Quantity::Xyz), Dialect::Baseline),
+            ("chromaticity", chromaticity(lamp()), Dialect::Baseline),
             ("attempts", only(surface(None), Quantity::Attempts), Dialect::Baseline),
             ("lrv_base", lrv(Bounds::Base), Dialect::Baseline),
             ("lrv_scaled", lrv(Bounds::Scaled), Dialect::Baseline),

@@ -65,6 +65,7 @@ fn interface(program: &Program) -> String {
             Source::Map(_, unit) => {
                 let (result, head) = match quantity {
                     Quantity::Xyz | Quantity::LinearSrgb => ("vec3<f32>".to_owned(), "vec3".to_owned()),
+                    Quantity::Chromaticity => ("vec2<f32>".to_owned(), "vec2".to_owned()),
                     Quantity::Lrv => ("f32".to_owned(), String::new()),
                     _ => (format!("array<f32, {width}>"), "array".to_owned()),
                 };
