@@ -32,6 +32,11 @@ pub(super) fn format(path: &Path) -> Result<PictureFormat, Usage> {
     PictureFormat::of(path).ok_or_else(unknown)
 }
 
+/// What a picture calls the file or built-in model that it shows: no folders, which mean nothing to readers of a picture.
+fn title(name: &str) -> String {
+    Path::new(name).file_name().map_or_else(|| name.to_owned(), |name| name.to_string_lossy().into_owned())
+}
+
 /// Writes a picture, which appears only when it is complete, and names it on standard error.
 pub(super) fn write(
     drawing: &Scene,

@@ -73,7 +73,7 @@ impl Picture<'_> {
             .render();
         drawing.elements.extend(self.key(place(1).corner));
         drawing.elements.extend(text);
-        plot::head(&mut drawing, self.name, &self.facts(), self.theme);
+        plot::head(&mut drawing, &super::title(self.name), &self.facts(), self.theme);
         drawing
     }
 
@@ -215,7 +215,7 @@ impl Picture<'_> {
         if k <= MAX_LABELLED {
             for &(x, y) in shown.iter().skip(1) {
                 // Above and right of its point, where the falling line is not.
-                let text = TextAnnotation::new(percent(y / 100.0), x + 0.03 * width, y);
+                let text = TextAnnotation::new(percent(y / 100.0), x + 0.09 * width, y);
                 layout = layout.with_annotation(text.with_font_size(TICK_SIZE).with_color(self.theme.ink()));
             }
         }
@@ -459,6 +459,7 @@ mod tests {
     #[test]
     fn a_picture_shows_what_the_model_leaves_and_explains() {
         let svg = svg(&Model::builtin("munsell-vrhel").unwrap());
+        assert_eq!(svg.split('>').next().map(|head| head.matches("font-family").count()), Some(1));
         for text in [
             "this one",
             "draws of seed 3",

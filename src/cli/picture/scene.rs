@@ -87,7 +87,7 @@ impl Preview {
         theme: Theme,
     ) -> anyhow::Result<Preview> {
         let mut preview = Preview {
-            title: format!("{name}, seed {}, {} nm", scene.seed(), scene.grid()),
+            title: format!("{}, seed {}, {} nm", super::title(name), scene.seed(), scene.grid()),
             theme,
             first: scenes.start,
             tiles: Vec::new(),
@@ -231,7 +231,7 @@ impl Preview {
             let (x, y) = border[wavelength - 400];
             let (dx, anchor) =
                 if wavelength < 500 { (-6.0, TextAnchor::End) } else { (6.0, TextAnchor::Start) };
-            all.push(plot::text((x + dx, y + 1.0), TICK_SIZE - 1, &wavelength.to_string(), anchor, quiet));
+            all.push(plot::text((x + dx, y - 3.0), TICK_SIZE - 1, &wavelength.to_string(), anchor, quiet));
         }
         let corners = [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.64, 0.33)].map(|(x, y)| at(x, y));
         all.push(line(&corners, quiet, 0.8));

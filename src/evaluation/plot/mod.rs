@@ -4,6 +4,7 @@
 
 mod pdf;
 mod theme;
+mod typeface;
 
 use std::path::Path;
 
@@ -46,7 +47,9 @@ impl PictureFormat {
     pub fn bytes(self, drawing: &Scene) -> Result<Vec<u8>, String> {
         match self {
             PictureFormat::Svg => Ok(svg(drawing).into_bytes()),
-            PictureFormat::Png => RasterBackend::new().with_scale(SCALE).render_scene(drawing),
+            PictureFormat::Png => {
+                RasterBackend::new().with_scale(SCALE).render_scene(&typeface::outlined(drawing)?)
+            }
             PictureFormat::Pdf => pdf::document(drawing),
         }
     }
@@ -54,12 +57,12 @@ impl PictureFormat {
 
 /// A drawing as SVG that scales with the page it is on.
 pub fn svg(drawing: &Scene) -> String {
-    let head = format!(
-        r#"<svg viewBox="0 0 {} {}" font-family="{FONTS}" "#,
-        drawing.width.ceil(),
-        drawing.height.ceil()
-    );
-    // The plot library writes neither attribute.
+    let (width, height) = (drawing.width.ceil(), drawing.height.ceil());
+    // The plot library writes no view box, and the typeface only of drawings that name one.
+    let mut head = format!(r#"<svg viewBox="0 0 {width} {height}" "#);
+    if drawing.font_family.is_none() {
+        head += &format!(r#"font-family="{FONTS}" "#);
+    }
     SvgBackend::new().render_scene(drawing).replacen("<svg ", &head, 1)
 }
 

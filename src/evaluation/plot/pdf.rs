@@ -6,17 +6,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use kuva::prelude::SvgBackend;
 use kuva::render::color::Color;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 use pdf_writer::types::{CidFontType, FontFlags, LineJoinStyle, SystemInfo, UnicodeCmap};
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str};
 use subsetter::GlyphRemapper;
 use ttf_parser::Face;
+
+use super::typeface;
 
 /// Points of a page for each unit of a drawing: 72 of the one are an inch, and 96 of the other.
 const POINT: f64 = 0.75;
@@ -32,21 +31,13 @@ const QUARTER: f32 = 0.552_284_8;
 
 /// The drawing as a document.
 pub(super) fn document(drawing: &Scene) -> Result<Vec<u8>, String> {
-    let typeface = typeface()?;
+    let typeface = typeface::bytes()?;
     let face = Face::parse(&typeface, 0).map_err(|e| e.to_string())?;
     let mut page = Page::new(drawing, face)?;
     for element in &drawing.elements {
         page.add(element)?;
     }
     page.finish(&typeface)
-}
-
-/// DejaVu Sans, in which the plot library measures text and draws it in PNG files. It gives the typeface away only
-/// inside an SVG.
-fn typeface() -> Result<Vec<u8>, String> {
-    let svg = SvgBackend::new().with_embedded_font(true).render_scene(&Scene::new(1.0, 1.0));
-    let encoded = svg.split_once("base64,").and_then(|(_, rest)| rest.split('\'').next());
-    STANDARD.decode(encoded.ok_or("no typeface was found")?).map_err(|e| e.to_string())
 }
 
 /// How a shape is painted.
@@ -260,18 +251,13 @@ impl<'a> Page<'a> {
         let mut length = 0.0;
         for character in text.chars() {
             let glyph = self.face.glyph_index(character).unwrap_or_default();
-            let advance = f32::from(self.face.glyph_hor_advance(glyph).unwrap_or_default());
-            let advance = advance / f32::from(self.face.units_per_em());
+            let advance = typeface::advance(&self.face, character);
             let code = self.glyphs.remap(glyph.0);
-            self.characters.insert(code, (character, advance));
+            self.characters.insert(code, (character, advance as f32));
             codes.extend(code.to_be_bytes());
-            length += f64::from(advance * size);
+            length += advance * f64::from(size);
         }
-        let before = match anchor {
-            TextAnchor::Start => 0.0,
-            TextAnchor::Middle => length / 2.0,
-            TextAnchor::End => length,
-        };
+        let before = typeface::before(anchor, length);
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let (x, y) = ((x - before * cosine) as f32, (y - before * sine) as f32);
         let (sine, cosine) = (sine as f32, cosine as f32);
