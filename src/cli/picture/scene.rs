@@ -229,9 +229,12 @@ impl Preview {
         all.push(line(&border, ink, 1.2));
         for wavelength in [460, 480, 520, 540, 560, 580, 600, 620] {
             let (x, y) = border[wavelength - 400];
-            let (dx, anchor) =
-                if wavelength < 500 { (-6.0, TextAnchor::End) } else { (6.0, TextAnchor::Start) };
-            all.push(plot::text((x + dx, y - 3.0), TICK_SIZE - 1, &wavelength.to_string(), anchor, quiet));
+            let (dx, dy, anchor) = match wavelength {
+                ..500 => (-6.0, 2.0, TextAnchor::End),
+                _ => (6.0, -3.0, TextAnchor::Start),
+            };
+            let (at, name) = ((x + dx, y + dy), wavelength.to_string());
+            all.push(plot::text(at, TICK_SIZE - 1, &name, anchor, quiet));
         }
         let corners = [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.64, 0.33)].map(|(x, y)| at(x, y));
         all.push(line(&corners, quiet, 0.8));
