@@ -6,27 +6,28 @@ use kuva::prelude::{BandPlot, Layout, LinePlot, Plot, ScatterPlot, TickFormat};
 use kuva::render::figure::Figure;
 use kuva::render::render::{Primitive, TextAnchor};
 
-use crate::evaluation::plot::{self, Heading, LABEL_SIZE};
+use crate::evaluation::plot::{self, Caption, Place, TICK_SIZE, Theme};
 
-/// The size of a chart, and what it leaves for text on its left, right and bottom.
+/// The report is a white page.
+const THEME: Theme = Theme::Light;
+
+/// Size of a chart, and what it leaves for text on its left, right and bottom.
 const SIZE: (f64, f64) = (640.0, 430.0);
-const MARGINS: [f64; 3] = [64.0, 18.0, 48.0];
+const MARGINS: [f64; 3] = [84.0, 18.0, 50.0];
 
-/// What is left above the axes for the title and the name of the vertical axis, and for each row of the key.
-const HEAD: f64 = 58.0;
-const KEY_ROW: f64 = 18.0;
-
-const HEADING: Heading = Heading { title_size: 15, x: 12.0, title: 21.0, label: 40.0 };
+/// Height above the axes for the title, and for each row of the key.
+const HEAD: f64 = 40.0;
+const KEY_ROW: f64 = 19.0;
 
 /// About the width of a character of the key.
-const CHARACTER: f64 = 6.2;
+const CHARACTER: f64 = 6.9;
 
-/// For what only guides the eye.
-pub(super) const GUIDE: &str = plot::QUIET;
+/// Colour of what only guides the eye.
+pub(super) const GUIDE: &str = THEME.quiet();
 
-/// Those that show on thin lines.
+/// Colours that show on thin lines.
 pub(super) const COLOURS: [&str; 6] = {
-    let all = plot::COLOURS;
+    let all = THEME.colours();
     [all[0], all[1], all[2], all[3], all[4], all[6]]
 };
 
@@ -151,7 +152,11 @@ impl Chart {
             .with_spacing(0.0)
             .with_padding(0.0)
             .render();
-        HEADING.set(&mut scene);
+        let [left, right, bottom] = MARGINS;
+        let place = Place { corner: (0.0, 0.0), size: SIZE, margins: [left, right, top, bottom] };
+        let caption =
+            Caption { title: self.title.clone(), vertical: self.y.label.clone(), ..Caption::default() };
+        scene.elements.extend(caption.draw(&place, THEME));
         for key in keys {
             scene.elements.extend(key.draw(HEAD));
         }
@@ -162,10 +167,8 @@ impl Chart {
         let plotted = |axis: &Axis| (axis.limits.0 / axis.unit(), axis.limits.1 / axis.unit());
         let [left, right, bottom] = MARGINS;
         let margins = [left, right, top, bottom];
-        let mut layout = plot::axes(plotted(&self.x), plotted(&self.y), margins, HEADING.title_size)
-            .with_title(self.title.clone())
-            .with_x_label(self.x.label.clone())
-            .with_y_label(self.y.label.clone());
+        let mut layout =
+            THEME.axes(plotted(&self.x), plotted(&self.y), margins).with_x_label(self.x.label.clone());
         if self.x.logarithmic {
             layout = layout.with_log_x().with_x_tick_format(powers(&self.x));
         }
@@ -204,15 +207,7 @@ impl Key<'_> {
     fn draw(&self, top: f64) -> Vec<Primitive> {
         let y = top + KEY_ROW * self.row as f64;
         let mark = match self.series.style {
-            Style::Points => Primitive::Circle {
-                cx: self.x + 11.0,
-                cy: y,
-                r: 3.6,
-                fill: self.series.colour.into(),
-                fill_opacity: None,
-                stroke: None,
-                stroke_width: None,
-            },
+            Style::Points => plot::disc((self.x + 11.0, y), 3.6, self.series.colour, None),
             style => {
                 let dashes = match style {
                     Style::Dashed => Some("6 3"),
@@ -223,7 +218,7 @@ impl Key<'_> {
             }
         };
         let (at, name) = ((self.x + 28.0, y + 4.0), &self.series.name);
-        let text = plot::text(at, LABEL_SIZE - 1, name, TextAnchor::Start, None);
+        let text = plot::text(at, TICK_SIZE, name, TextAnchor::Start, THEME.ink());
         vec![mark, text]
     }
 }
