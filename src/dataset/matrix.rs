@@ -1,4 +1,4 @@
-//! Matrices of spectra by the naming conventions of the field: a matrix, and its sampling `S_x` = [start step count]
+//! Matrices of spectra by the naming conventions of the field: a matrix with its sampling `S_x` = [start step count]
 //! (nm) beside it, as in `sur_vrhel` with `S_vrhel`, or else a vector `wavelength`.
 
 use std::path::Path;
@@ -16,7 +16,7 @@ pub(super) struct Matrix {
     pub(super) values: Vec<f64>,
 }
 
-/// The table of the matrix that `variable` names, or of the only one with its sampling beside it.
+/// Returns the table of the matrix that `variable` names, or of the only one with its sampling beside it.
 pub(super) fn choose(
     path: &Path,
     matrices: &[Matrix],
@@ -76,7 +76,7 @@ fn sampling(matrix: &Matrix) -> Option<(String, Grid)> {
     (count.fract() == 0.0).then(|| Grid::new(start, step, count as usize).ok())?.map(|grid| (suffix, grid))
 }
 
-/// The grid of a vector of wavelengths, which is for every matrix of the file.
+/// The grid of a vector of wavelengths, which serves every matrix of the file.
 fn wavelengths(matrix: &Matrix) -> Option<(String, Grid)> {
     let is_named = matches!(matrix.name.to_ascii_lowercase().as_str(), "wavelength" | "wavelengths" | "wave");
     let is_vector = matrix.rows == 1 || matrix.columns == 1;
