@@ -1,4 +1,4 @@
-//! MATLAB v7.3, which is HDF5 with a header and the classes of the variables.
+//! MATLAB v7.3: HDF5 with a header and the classes of the variables.
 //!
 //! By the names that two toolboxes look for. Psychtoolbox: spectra in the columns of `X`, and `S_X` = [start step
 //! count] beside it. ISET: `wavelength`, `data` (which is `X` under a second name, and takes no room) and `comment`.
@@ -16,7 +16,7 @@ use super::h5::{self, io_error};
 use super::schema::Schema;
 use crate::quantity::Dtype;
 
-/// What comes before HDF5: 116 characters of text, and a version.
+/// Bytes before the HDF5 part: 116 characters of text, and a version.
 const USERBLOCK: u64 = 512;
 
 pub(super) struct Mat {
@@ -96,7 +96,7 @@ fn class(set: &H5Dataset, name: &str) -> Result<(), Hdf5Error> {
     h5::text_attribute(set, "MATLAB_class", name)
 }
 
-/// A small matrix of doubles. HDF5's first dimension is MATLAB's last.
+/// Writes a small matrix of doubles. HDF5's first dimension is MATLAB's last.
 fn row(file: &H5File, name: &str, values: &[f64], shape: &[usize]) -> Result<(), Hdf5Error> {
     let set = file.new_dataset::<f64>().shape(shape).create(name)?;
     set.write_raw(values)?;

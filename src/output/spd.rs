@@ -1,4 +1,4 @@
-//! A folder of text files, one a spectrum, as renderers read them: wavelength in nm and value on each line.
+//! A folder of text files, one per spectrum, as renderers read them: wavelength in nm and value on each line.
 //!
 //! Named as the method's authors named theirs, and numbered from 1: `illuminance_001.spd`, `reflectance_001.spd`,
 //! and `luminance-0.4000-reflectance-001.spd` where there is a target luminous reflectance.
@@ -13,17 +13,18 @@ use super::pending::{self, existing_folder};
 use super::schema::Schema;
 use super::{IfExists, OutputError};
 
-/// The most files that are written without being asked twice: folders of more are slow to open, and to delete.
+/// Largest number of files written without confirmation: folders of more are slow to open, and to delete.
 pub const MOST_FILES: u64 = 10_000;
 
-/// What the spectra are, for their names.
+/// Kind of the spectra, for the names of their files.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SpdName {
     /// Illuminants.
     Illuminant,
     /// Reflectances.
     Reflectance,
-    /// Reflectances of this luminous reflectance value.
+    /// Reflectances with this luminous reflectance (CIE Y of the 1931 2 degree observer under D65, perfect white =
+    /// 1).
     ReflectanceAt(f64),
 }
 
@@ -37,7 +38,7 @@ impl SpdName {
     }
 }
 
-/// A folder on its way to a name.
+/// Writer of a folder that appears under its name only when it is complete.
 pub struct SpdFolder {
     folder: TempDir,
     path: PathBuf,
@@ -47,7 +48,7 @@ pub struct SpdFolder {
 }
 
 impl SpdFolder {
-    /// Begins a folder that will appear as `path`, and whose first spectrum is that of row `first`.
+    /// Begins a folder that will appear as `path`; its first spectrum is that of row `first`.
     pub fn create(
         path: &Path,
         schema: &Schema,
@@ -118,7 +119,8 @@ impl SpdFolder {
     }
 }
 
-/// Nine significant digits, which tell every f32 from every other, without an exponent: not all readers know those.
+/// Formats nine significant digits, which tell every f32 from every other, without an exponent: not all readers know
+/// those.
 fn decimal(value: f64) -> String {
     let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
     format!("{value:.*}", (8 - magnitude).max(0) as usize)
