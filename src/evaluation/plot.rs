@@ -1,4 +1,4 @@
-//! What all pictures have in common: colours, axes, headings, shapes, and how they become files.
+//! Common parts of all pictures: colours, axes, headings, shapes, and the files they become.
 //!
 //! It is public for the program, and no part of the library's interface.
 
@@ -10,28 +10,28 @@ use kuva::render::render::{Primitive, Scene, TextAnchor};
 
 use crate::colorimetry;
 
-/// Text and axes.
+/// Colour of text and axes.
 pub const INK: &str = "#2b2f36";
-/// The names of axes.
+/// Colour of the names of axes.
 pub const LABEL_INK: &str = "#5b626c";
-/// What only guides the eye.
+/// Colour of guides.
 pub const QUIET: &str = "#8a9099";
-/// The ground of what would drown on white.
+/// Ground for colours that would drown on white.
 pub const DARK: &str = "#17181c";
-/// The lines of a grid, and the ground of what has colours of its own.
+/// Colour of grid lines, and ground for what has colours of its own.
 pub const PALE: &str = "#e6e8eb";
 
 /// Colours of Okabe and Ito, told apart by the colour-blind too, without their yellow, and two more.
 pub const COLOURS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6b4c9a", "#7f7f7f"];
 
-/// The size of the text on axes and in keys.
+/// Size of the text on axes and in keys.
 pub const LABEL_SIZE: u32 = 12;
 
 /// Pixels of a PNG for each unit of an SVG.
 const SCALE: f32 = 1.5;
 
-/// A format of pictures.
+/// Format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureFormat {
     /// Vectors.
@@ -41,7 +41,7 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
-    /// The format that the extension of `path` names, if it does.
+    /// Returns the format that the extension of `path` names, if it does.
     pub fn of(path: &Path) -> Option<PictureFormat> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "svg" => Some(PictureFormat::Svg),
@@ -50,7 +50,7 @@ impl PictureFormat {
         }
     }
 
-    /// The bytes of a drawing as a file, or why there are none.
+    /// Encodes a drawing as a file.
     pub fn bytes(self, drawing: &Scene) -> Result<Vec<u8>, String> {
         match self {
             PictureFormat::Svg => Ok(svg(drawing).into_bytes()),
@@ -59,13 +59,13 @@ impl PictureFormat {
     }
 }
 
-/// A drawing as SVG.
+/// Encodes a drawing as SVG.
 pub fn svg(drawing: &Scene) -> String {
     SvgBackend::new().render_scene(drawing)
 }
 
-/// Axes with exactly these limits, in the style that all plots share. `margins` are what is left for text on the left,
-/// right, top and bottom.
+/// Makes axes with exactly these limits, in the style that all plots share. `margins` are the room for text on the
+/// left, right, top and bottom.
 pub fn axes(x: (f64, f64), y: (f64, f64), margins: [f64; 4], title_size: u32) -> Layout {
     let theme = Theme {
         axis_color: INK.into(),
@@ -89,16 +89,16 @@ pub fn axes(x: (f64, f64), y: (f64, f64), margins: [f64; 4], title_size: u32) ->
         .with_tick_size(LABEL_SIZE - 1)
 }
 
-/// Where the heading of a plot is: its title, and below that the name of its vertical axis.
+/// Place of a plot's heading: its title, and below that the name of its vertical axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Heading {
-    /// The size of the title, which tells it from other text.
+    /// Size of the title, which tells it from other text.
     pub title_size: u32,
-    /// The left end of both.
+    /// Left end of both.
     pub x: f64,
-    /// The base line of the title.
+    /// Base line of the title.
     pub title: f64,
-    /// The base line of the axis' name.
+    /// Base line of the axis' name.
     pub label: f64,
 }
 

@@ -200,8 +200,7 @@ pub struct FileWriter {
 }
 
 impl FileWriter {
-    /// Begins a file that will appear as `path`, in a format of single files. The format is one of those of a single
-    /// file.
+    /// Begins a file that will appear as `path`, in a format of single files.
     pub fn create(
         path: &Path,
         format: FileFormat,

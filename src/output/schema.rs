@@ -216,7 +216,7 @@ impl Schema {
         self.fields.iter().map(|field| field.stored_bytes() as u64).sum()
     }
 
-    /// Number of draws in a window of columns, which must agree. They must agree.
+    /// Number of draws in a window of columns, which must agree.
     pub(super) fn rows(&self, columns: &[&[u8]]) -> usize {
         assert_eq!(columns.len(), self.fields.len(), "a column for each field");
         let mut rows = self.fields.iter().zip(columns).map(|(field, column)| {

@@ -8,45 +8,45 @@ use kuva::render::render::{Primitive, TextAnchor};
 
 use crate::evaluation::plot::{self, Heading, LABEL_SIZE};
 
-/// The size of a chart, and what it leaves for text on its left, right and bottom.
+/// Size of a chart, and its room for text on the left, right and bottom.
 const SIZE: (f64, f64) = (640.0, 430.0);
 const MARGINS: [f64; 3] = [64.0, 18.0, 48.0];
 
-/// What is left above the axes for the title and the name of the vertical axis, and for each row of the key.
+/// Height above the axes for the title and the name of the vertical axis, and for each row of the key.
 const HEAD: f64 = 58.0;
 const KEY_ROW: f64 = 18.0;
 
 const HEADING: Heading = Heading { title_size: 15, x: 12.0, title: 21.0, label: 40.0 };
 
-/// About the width of a character of the key.
+/// Approximate width of a character of the key.
 const CHARACTER: f64 = 6.2;
 
-/// For what only guides the eye.
+/// Colour of guides.
 pub(super) const GUIDE: &str = plot::QUIET;
 
-/// Those that show on thin lines.
+/// Colours that show on thin lines.
 pub(super) const COLOURS: [&str; 6] = {
     let all = plot::COLOURS;
     [all[0], all[1], all[2], all[3], all[4], all[6]]
 };
 
-/// An axis.
+/// Axis of a chart.
 pub(super) struct Axis {
     pub(super) label: String,
     pub(super) limits: (f64, f64),
     pub(super) logarithmic: bool,
 }
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
     /// Points joined by a line.
     Line,
     /// A line without points.
     Plain,
-    /// A broken one.
+    /// A broken line.
     Dashed,
-    /// One of dots.
+    /// A dotted line.
     Dotted,
     /// Points alone.
     Points,
@@ -54,7 +54,7 @@ pub(super) enum Style {
     Steps,
 }
 
-/// Points, and where given how far down and up each may be.
+/// Series of points, with the range of each down and up where given.
 pub(super) struct Series {
     pub(super) name: String,
     pub(super) colour: &'static str,
@@ -76,7 +76,7 @@ impl Axis {
         Axis { label: label.to_owned(), limits, logarithmic: false }
     }
 
-    /// A logarithmic axis that holds all positive values, from a 1, 2 or 5 to another.
+    /// Makes a logarithmic axis that holds all positive values, from a 1, 2 or 5 to another.
     pub(super) fn decades(label: &str, values: impl IntoIterator<Item = f64>) -> Axis {
         let values = values.into_iter().filter(|&v| v > 0.0 && v.is_finite());
         let (low, high) = values.fold((f64::INFINITY, 0f64), |(a, b), v| (a.min(v), b.max(v)));
@@ -85,7 +85,7 @@ impl Axis {
         Axis { label: label.to_owned(), limits, logarithmic: true }
     }
 
-    /// What values are divided by to be plotted: kuva takes all below 1e-10 for that on a logarithmic axis.
+    /// Divisor of values before plotting: kuva takes all below 1e-10 for that on a logarithmic axis.
     fn unit(&self) -> f64 {
         let decade = 10f64.powf(self.limits.0.log10().floor());
         if self.logarithmic && decade < 1e-9 { decade } else { 1.0 }
@@ -137,7 +137,7 @@ impl Series {
 }
 
 impl Chart {
-    /// The chart as SVG.
+    /// Draws the chart as SVG.
     pub(super) fn svg(&self) -> String {
         let keys = self.keys();
         let rows = keys.iter().map(|key| key.row + 1).max().unwrap_or(0);
@@ -193,7 +193,7 @@ impl Chart {
     }
 }
 
-/// An entry of the key.
+/// Entry of the key.
 struct Key<'a> {
     series: &'a Series,
     x: f64,
@@ -228,8 +228,8 @@ impl Key<'_> {
     }
 }
 
-/// Powers of ten as such, unless all are short. What lies between them is named where there is room, on axes of two
-/// decades or less.
+/// Formats powers of ten as such, unless all are short. Numbers between them are named where there is room, on axes
+/// of two decades or less.
 fn powers(axis: &Axis) -> TickFormat {
     let ((low, high), unit) = (axis.limits, axis.unit());
     let (few, short) = (high / low < 101.0, low > 0.9e-3 && high < 1.1e4);
@@ -249,7 +249,7 @@ fn powers(axis: &Axis) -> TickFormat {
     }))
 }
 
-/// A number in superscript.
+/// Writes a number in superscript.
 pub(super) fn superscript(n: i32) -> String {
     let digit = |c: char| match c {
         '-' => '⁻',

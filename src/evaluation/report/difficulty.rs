@@ -1,4 +1,4 @@
-//! Cost against difficulty: what a draw costs where few candidates are accepted.
+//! Cost against difficulty: time per draw where few candidates are accepted.
 
 use serde::Serialize;
 
@@ -22,26 +22,26 @@ pub struct Difficulty {
 /// A recipe on an engine.
 #[derive(Clone, Debug, Serialize)]
 pub struct Task {
-    /// What makes it difficult.
+    /// Name of the recipe: the setting that makes it difficult.
     pub name: String,
-    /// Whether that is the covariance's scale; else it is the target LRV.
+    /// Whether that setting is the covariance's scale; else it is the target LRV.
     pub by_scale: bool,
     /// The engine, as an index into the report's.
     pub engine: usize,
-    /// How many draws each run made.
+    /// Number of draws of each run.
     pub draws: u64,
     /// Whether candidates came from a cover.
     pub covered: bool,
-    /// The probability that a spectrum of the model obeys the rule.
+    /// Probability that a spectrum of the model is accepted.
     pub probability: f64,
-    /// The share of candidates that were accepted.
+    /// Share of candidates that were accepted.
     pub acceptance: f64,
-    /// Nanoseconds an accepted draw, the median of 3 runs.
+    /// Nanoseconds per accepted draw, the median of 3 runs.
     pub nanoseconds: f64,
 }
 
 impl Task {
-    /// Candidates for each draw.
+    /// Candidates per draw.
     pub fn attempts(&self) -> f64 {
         1.0 / self.acceptance
     }
@@ -94,7 +94,7 @@ pub(super) fn measure(bench: &Bench, name: &str, model: &Model) -> Result<Diffic
     Ok(Difficulty { tasks, refused })
 }
 
-/// Recipes from easy to what no plain rejection reaches.
+/// Makes recipes from easy ones to those that no plain rejection reaches.
 fn recipes(bench: &Bench, model: &Model) -> Vec<(String, bool, RecipeBuilder)> {
     let scales = bench.effort.pick(
         vec![0.01, 1.0, 4.0, 25.0, 100.0, 1e4, 1e6],
