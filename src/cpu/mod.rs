@@ -34,12 +34,12 @@ pub(crate) struct Kernel<R> {
     target: Option<LrvTarget<R>>,
     intensity: Option<IntensityLaw<R>>,
     proposal: Option<BoxMixture<R>>,
-    /// What a physical value is below, before scaling.
+    /// Upper limit of a physical value before scaling.
     limit: R,
     tests_scaled: bool,
     may_exceed_one: bool,
     max_attempts: u32,
-    /// What the values of spectra are between.
+    /// Range of values that spectra may take.
     range: ValueRange,
     outputs: Vec<Output<R>>,
 }
@@ -81,14 +81,14 @@ enum Unit<R> {
 /// The candidates that are being made, a lane each.
 struct Candidates<R, const L: usize> {
     normals: Vec<[R; L]>,
-    /// Before it is multiplied by the scale.
+    /// The spectrum before it is multiplied by the scale.
     spectrum: Vec<[R; L]>,
     scale: [R; L],
-    /// For each output; empty where it is no map.
+    /// Values of each output's map; empty where it has none.
     maps: Vec<Mapped<R, L>>,
 }
 
-/// The values of a map, and what they are to be multiplied by.
+/// Values of a map, and the factor to multiply them by.
 struct Mapped<R, const L: usize> {
     values: Vec<[R; L]>,
     unit: [R; L],
@@ -108,12 +108,12 @@ impl<R: Real, const L: usize> Candidates<R, L> {
     }
 }
 
-/// Where draws go. A trait and not a closure, for the reason of [`Blocks`].
+/// Destination of draws. A trait and not a closure, for the reason of [`Blocks`].
 trait Take<R, const L: usize> {
     fn take(&mut self, done: &[Done], candidates: &Candidates<R, L>);
 }
 
-/// What candidates came to, a lane each.
+/// Results of judging candidates, one per lane.
 struct Verdicts<const L: usize> {
     accepted: [bool; L],
     above_one: [bool; L],
@@ -155,7 +155,7 @@ impl<R: Real> Kernel<R> {
         }
     }
 
-    /// How many values the first output has.
+    /// Number of values of the first output.
     #[cfg(feature = "report")]
     pub(crate) fn width(&self) -> usize {
         self.outputs[0].format.width
@@ -206,7 +206,7 @@ impl<R: Real> Kernel<R> {
         values.collect()
     }
 
-    /// Makes all of `draws`, each of which goes to `to` when it is done.
+    /// Draws a range; each draw goes to `to` when it is done.
     #[inline(always)]
     fn in_lanes<const L: usize>(&self, draws: DrawRange, to: &mut impl Take<R, L>) {
         let mut candidates = self.candidates::<L>();
@@ -334,7 +334,7 @@ impl<R: Real> Map<R> {
 }
 
 impl<R: Real> LrvTarget<R> {
-    /// What scales spectra to the target.
+    /// Factor that scales spectra to the target.
     #[inline(always)]
     fn factor<const L: usize>(&self, spectrum: &[[R; L]]) -> [R; L] {
         let mut lrv = [R::ZERO; L];
@@ -371,14 +371,14 @@ fn largest<R: Real>(a: R, b: R) -> R {
     if b > a { b } else { a }
 }
 
-/// The least and the largest value of each lane.
+/// Smallest and largest value of each lane.
 struct Range<R, const L: usize> {
     low: [R; L],
     high: [R; L],
 }
 
 impl<R: Real, const L: usize> Range<R, L> {
-    /// That of values, four by four: a comparison waits for the last.
+    /// Range of values, four by four: a comparison waits for the last.
     #[inline(always)]
     fn of(values: &[[R; L]]) -> Self {
         let mut range = Range { low: [R::INFINITY; L], high: [R::ZERO; L] };

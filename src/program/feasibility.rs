@@ -1,4 +1,4 @@
-//! The set of acceptable draws, before any is made: whether it is empty, and how light a reflectance can be.
+//! Feasibility of draws before any is made: whether any is acceptable, and how light a reflectance can be.
 //!
 //! Every rule is linear in the standard normals z, so what is accepted is a polytope, and a small linear program
 //! answers exactly what a pilot run could only suspect. Points beyond [`REACH`] standard deviations are left out:
@@ -15,7 +15,7 @@ use crate::dataset::SpectrumKind;
 /// Coefficients of unit rows below this are dropped: together they move no bound by 1e-7, the solver's tolerance.
 const NEGLIGIBLE: f64 = 1e-12;
 
-/// What room a set of half-spaces leaves.
+/// Room that a set of half-spaces leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Room {
     /// The largest ball within all of them, in standard deviations.
@@ -113,7 +113,7 @@ pub(crate) fn nearest_xyz(program: &Program, xyz: &Affine, target: [f64; 3]) -> 
     )
 }
 
-/// The bounds that a program's rule sets.
+/// Half-spaces of a program's bounds.
 pub(crate) fn half_spaces(program: &Program) -> Vec<HalfSpace> {
     let gains = |band: usize| program.spectrum.gain.iter().map(move |gain| gain[band]);
     let mut half_spaces = Vec::new();

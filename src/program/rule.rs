@@ -1,4 +1,4 @@
-//! The rule that a spectrum must meet, and the factor that scales it.
+//! Bounds that a spectrum must meet, and the factor that scales it.
 
 use std::collections::HashMap;
 use std::iter;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::affine::Affine;
 
-/// What must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance.
+/// Spectrum that must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance (LRV).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -24,7 +24,7 @@ pub enum Bounds {
 /// A target luminous reflectance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LrvTarget {
-    /// The luminous reflectance value (LRV) of every draw, in (0, 1).
+    /// The luminous reflectance (LRV) of every draw, in (0, 1): CIE Y of the 1931 2 degree observer under D65.
     pub(crate) lrv: f64,
     /// The weights of the bands in a reflectance's LRV; they sum to 1. Draws are scaled by sums over their bands as
     /// they were rounded, so that it is the spectrum that comes out which has the target; a map of z would be off
@@ -34,8 +34,8 @@ pub(crate) struct LrvTarget {
 }
 
 impl LrvTarget {
-    /// The same for these spectra, with the weights of bands that are alike on the first of them. A driver may take
-    /// v s + w s for (v + w) s, which rounds otherwise.
+    /// Returns the target for these spectra, with the weights of bands that are alike on the first of them. A driver
+    /// may take v s + w s for (v + w) s, which rounds otherwise.
     pub(crate) fn of_unlike_bands(mut self, spectrum: &Affine) -> LrvTarget {
         let mut first = HashMap::new();
         for (band, offset) in spectrum.offset.iter().enumerate() {

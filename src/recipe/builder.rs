@@ -1,4 +1,4 @@
-//! From what is asked for to a recipe, if it can be drawn.
+//! Construction of recipes, and the checks that they can be drawn.
 
 use super::outputs::{OutputRequest, outputs};
 use super::pilot::{TOLERABLE_FAILURE, failure, pilot};
@@ -46,21 +46,21 @@ impl RecipeBuilder {
         }
     }
 
-    /// The quantities that come out, at least one; [`Quantity::Spectra`] unless said. Engines add
+    /// Sets the quantities of each draw, at least one; [`Quantity::Spectra`] unless set. Engines add
     /// [`Quantity::Attempts`].
     pub fn quantities(mut self, quantities: impl IntoIterator<Item = Quantity>) -> Self {
         self.outputs.quantities = quantities.into_iter().collect();
         self
     }
 
-    /// How quantities with several values a draw are ordered ([`Layout::Rows`]).
+    /// Sets the order of the values of quantities that have several per draw ([`Layout::Rows`]).
     pub fn layout(mut self, layout: Layout) -> Self {
         self.outputs.layout = layout;
         self
     }
 
-    /// The type of the spectra ([`Dtype::F32`]). In [`Dtype::F16`] they are rounded to nearest and ties to even, but never
-    /// to an end of their [`ValueRange`]; above 65,504 they are infinite. Other quantities stay in 32 bits.
+    /// Sets the type of the spectra ([`Dtype::F32`]). In [`Dtype::F16`] they are rounded to nearest and ties to even,
+    /// but never to an end of their [`ValueRange`]; above 65,504 they are infinite. Other quantities stay in 32 bits.
     ///
     /// [`ValueRange`]: crate::ValueRange
     pub fn spectra_dtype(mut self, dtype: Dtype) -> Self {
@@ -68,13 +68,13 @@ impl RecipeBuilder {
         self
     }
 
-    /// The illuminant under which reflectances have their XYZ and linear sRGB ([`Illuminant::D65`]).
+    /// Sets the illuminant under which reflectances have their XYZ and linear sRGB ([`Illuminant::D65`]).
     pub fn illuminant(mut self, illuminant: Illuminant) -> Self {
         self.outputs.illuminant = Some(illuminant);
         self
     }
 
-    /// The scale of an illuminant's XYZ and linear sRGB ([`XyzScale::Absolute`]).
+    /// Sets the scale of an illuminant's XYZ and linear sRGB ([`XyzScale::Absolute`]).
     pub fn xyz_scale(mut self, scale: XyzScale) -> Self {
         self.outputs.xyz_scale = Some(scale);
         self
@@ -85,7 +85,8 @@ impl RecipeBuilder {
         RecipeBuilder { intensity: Some(intensity), ..self }
     }
 
-    /// Scales every draw to a luminous reflectance value (LRV, 0 to 1), eq. 9 and 10.
+    /// Scales every draw to a luminous reflectance (LRV, 0 to 1), eq. 9 and 10: CIE Y of the 1931 2 degree observer
+    /// under D65, perfect white = 1.
     pub fn lrv(self, lrv: f64) -> Self {
         RecipeBuilder { lrv: Some(lrv), ..self }
     }
@@ -107,7 +108,7 @@ impl RecipeBuilder {
         RecipeBuilder { xyz: Some(xyz), ..self }
     }
 
-    /// What must lie between 0 and 1 where there is a target LRV ([`Bounds::Base`]).
+    /// Sets the spectrum that must lie between 0 and 1 where there is a target LRV ([`Bounds::Base`]).
     pub fn bounds(self, bounds: Bounds) -> Self {
         RecipeBuilder { bounds: Some(bounds), ..self }
     }
@@ -117,18 +118,18 @@ impl RecipeBuilder {
         RecipeBuilder { covariance_scale, ..self }
     }
 
-    /// Where candidates come from ([`ProposalKind::Auto`]).
+    /// Sets the source of candidates ([`ProposalKind::Auto`]).
     pub fn proposal(self, proposal: ProposalKind) -> Self {
         RecipeBuilder { proposal, ..self }
     }
 
-    /// How many candidates a draw may take ([`DEFAULT_MAX_ATTEMPTS`]).
+    /// Sets the largest number of candidates of a draw ([`DEFAULT_MAX_ATTEMPTS`]).
     pub fn max_attempts(self, max_attempts: u32) -> Self {
         RecipeBuilder { max_attempts, ..self }
     }
 
-    /// The recipe, if it can be drawn: its values make sense, a linear program finds room for a spectrum, and a pilot
-    /// run finds enough of it.
+    /// Builds the recipe, if it can be drawn: its values make sense, a linear program finds room for a spectrum, and
+    /// a pilot run accepts enough candidates.
     pub fn build(self) -> Result<Recipe, RecipeError> {
         let program = self.program()?;
         let half_spaces = feasibility::half_spaces(&program);
@@ -188,7 +189,7 @@ impl RecipeBuilder {
         Ok(program)
     }
 
-    /// The middle of what the rule of a program accepts; `None` where that is for the pilot run to find out.
+    /// A point in the middle of the accepted region; `None` where that is for the pilot run to find out.
     fn centre(&self, program: &Program, half_spaces: &[HalfSpace]) -> Result<Option<Vec<f64>>, RecipeError> {
         if let Some(target) = &program.target {
             let largest = feasibility::largest_lrv(program, &target.weights);
@@ -254,7 +255,7 @@ impl RecipeBuilder {
         })
     }
 
-    /// What giving the tristimulus values does to this model.
+    /// Effect of the given tristimulus values on this model.
     pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
         if self.model.kind() == SpectrumKind::Illuminant {
             return Err(RecipeError::XyzOfIlluminant);

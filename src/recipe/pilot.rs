@@ -6,7 +6,7 @@ use crate::cpu::Kernel;
 use crate::program::Program;
 use crate::random::stream::Stream;
 
-/// How many candidates estimate the acceptance before any work starts.
+/// Number of candidates of a pilot run.
 pub(super) const PILOT: u64 = 1 << 16;
 
 /// The probability that a draw finds no candidate within its attempts, above which a recipe is refused: one failure

@@ -37,7 +37,7 @@ impl<R: Real> ScalarSampler<R> {
         ScalarSampler { kernel: Kernel::new(program), quantities }
     }
 
-    /// Draw `index` of a stream.
+    /// Makes draw `index` of a stream.
     pub fn draw(&self, stream: Stream, index: u64) -> Draw<R> {
         self.drawn(self.kernel.draw(stream, index))
     }
@@ -65,7 +65,7 @@ pub struct Draw<R> {
 }
 
 impl<R> Draw<R> {
-    /// What it took.
+    /// Status of the draw.
     pub fn status(&self) -> DrawStatus {
         self.status
     }

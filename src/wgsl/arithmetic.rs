@@ -1,4 +1,4 @@
-//! What is computed of a candidate, in straight lines or in loops.
+//! Arithmetic of a candidate, in straight lines or in loops.
 //!
 //! Either way the functions are the same, of a candidate's `Normals`, and so is the order of operations:
 //! - `normals(key, index, stream, attempt) -> Normals`: k standard normals; or, of a cover,
@@ -17,7 +17,7 @@ use crate::program::{IntensityLaw, Program, Source, Unit};
 use crate::random::real::Arithmetic;
 use crate::random::stream;
 
-/// All of it.
+/// Writes all of the arithmetic.
 pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
     let mut text = match Form::of(program) {
         Form::Unrolled => unrolled(program),

@@ -2,7 +2,7 @@
 //! kind. None may hang, give what is not a number, or give a spectrum that is not physical.
 //!
 //! Tests demand every answer, and the report shows them for its user's adapter. Values are judged against the draw in
-//! f64 from the same words, in parts of the largest terms that they are made of, because that is what f32 rounds.
+//! f64 from the same words, relative to the largest terms that they are made of, because that is what f32 rounds.
 
 mod bounds;
 mod counters;
