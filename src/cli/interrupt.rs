@@ -11,7 +11,7 @@ use spectroll::export::{Destination, Output};
 #[error("interrupted; {0}")]
 pub(super) struct Interrupted(pub(super) String);
 
-/// Whether somebody asked for an end. Nothing until [`watch`].
+/// Set once somebody asked for an end. Empty until [`watch`].
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
 /// From here on Ctrl-C and the like are for [`check`] to see; before, they end the program. The end of its terminal

@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     quiet: bool,
 }
 
-/// What a run made and how, for people and programs.
+/// Result of a run, for people and programs.
 #[derive(Serialize)]
 struct Report {
     scene: String,
@@ -169,7 +169,7 @@ impl Job<'_> {
         self.scenes.end - self.scenes.start
     }
 
-    /// What is to be written and how, if that can be.
+    /// Output and schema of the data set, if it can be written.
     fn made(&self) -> anyhow::Result<(Output, Schema)> {
         if self.arguments.json && self.arguments.output.to_stdout() {
             return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
@@ -245,7 +245,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// What drawing takes, before anything is drawn.
+    /// Describes the workload of drawing, before anything is drawn.
     fn workload(&self, engine: &Engine) -> Report {
         let mut workload = self.scene.workload(self.count());
         if engine.adapter().is_none() && workload.shaders > 0 {

@@ -1,4 +1,4 @@
-//! Scenes as a data set: a row a scene, its arrays as columns, and beside them what all scenes share.
+//! Scenes as a data set: a row per scene, its arrays as columns, and beside them the arrays that all scenes share.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use crate::engine::{Engine, EngineError};
 use crate::output::{Field, Schema, SharedArray, SpdName};
 use crate::scene::{Array, GroupKind, GroupSummary, Scene, SceneSession};
 
-/// About how many spectra tell how an engine rounds, and in how many scenes at most.
+/// Approximate number of spectra that tell how an engine rounds, and the largest number of scenes for them.
 const ROUNDED: (u64, u64) = (4096, 64);
 
 /// The arrays of a scene that are wanted.
@@ -90,7 +90,8 @@ impl<'a> SceneExport<'a> {
         SceneExport { file: Some((name.to_owned(), text.to_owned())), ..self }
     }
 
-    /// What the data set holds, and what it is made from. The shared arrays have no values yet.
+    /// Schema of the data set: its columns, and the scene and seed it is made from. The shared arrays have no values
+    /// yet.
     pub fn schema(&self, output: &Output) -> Schema {
         let holds_shared = output.destination().holds_shared_arrays();
         let wanted = || self.scene.arrays().filter(|array| self.selection.has(array));
@@ -107,7 +108,7 @@ impl<'a> SceneExport<'a> {
         }
     }
 
-    /// What lies beside the rows.
+    /// Files beside the rows.
     pub fn companions(&self) -> Companions {
         let spd = match self.scene.arrays().find(|array| self.selection.has(array)).map(|array| array.kind) {
             Some(GroupKind::Illuminant) => SpdName::Illuminant,

@@ -1,6 +1,6 @@
 //! Feasibility of draws before any is made: whether any is acceptable, and how light a reflectance can be.
 //!
-//! Every rule is linear in the standard normals z, so what is accepted is a polytope, and a small linear program
+//! All bounds are linear in the standard normals z, so the accepted region is a polytope, and a small linear program
 //! answers exactly what a pilot run could only suspect. Points beyond [`REACH`] standard deviations are left out:
 //! their mass is below 1e-37 a component. The room is the radius of the largest ball of acceptable z, in standard
 //! deviations: a set without volume is empty.

@@ -3,8 +3,8 @@
 //! Everything that does not depend on the random words is folded here, in f64. A spectrum is linear in the k standard
 //! normals z of a candidate, and so is all that is linear in a spectrum: weights, tristimulus values, luminous
 //! reflectance. Each is an [`Affine`] map of z, with the weights' mean in its offset and the covariance's factor and
-//! scale in its gains. What is left of a draw is one pair of bounds that the spectrum must meet, and one factor that scales it.
-//! The shader and the CPU engine both work from this, and round it once.
+//! scale in its gains. All else in a draw is one pair of bounds that the spectrum must meet, and one factor that
+//! scales it. The shader and the CPU engine both work from this, and round it once.
 
 pub(crate) mod condition;
 pub(crate) mod feasibility;

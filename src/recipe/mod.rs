@@ -182,8 +182,8 @@ impl Recipe {
     /// one shader:
     ///
     /// - `PREFIX_draw(seed: vec2<u32>, index: vec2<u32>) -> PREFIX_Draw` makes the same draw as every engine. Its
-    ///   member `attempts` is how many candidates that took, 0 where it failed; the rest is for the functions below.
-    ///   `PREFIX_draw_in(stream, seed, index)` makes that of a [`Stream`] by its number.
+    ///   member `attempts` is the number of candidates that took, 0 where it failed; the rest is for the functions below.
+    ///   `PREFIX_draw_in(stream, seed, index)` draws from a [`Stream`], given its number.
     /// - for spectra, `PREFIX_at(draw, band) -> f32` and `PREFIX_spectrum(draw) -> array<f32, bands>`;
     /// - for weights, `PREFIX_weights(draw) -> array<f32, components>`;
     /// - for XYZ and sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_srgb`;

@@ -23,9 +23,9 @@ const COPIES: &str = include_str!("../../shaders/scene_copies.wgsl");
 /// a renderer.
 pub struct SceneSampler<'a> {
     scene: &'a Scene,
-    /// Those of the groups that the device draws.
+    /// Samplers of the groups that the device draws.
     samplers: Vec<Option<Sampler>>,
-    /// What multiplies and copies spectra, where some are.
+    /// Pipeline that multiplies and copies spectra, where some need it.
     copies: Option<wgpu::ComputePipeline>,
     once: Vec<Option<SharedSpectra>>,
 }
@@ -43,7 +43,7 @@ struct Group<'a> {
     copied: Option<Copied>,
     /// The spectra, where they are not those that are drawn.
     spectra: Option<wgpu::Buffer>,
-    /// What else is known of it: luminous reflectances, intensities.
+    /// Values beside the spectra: luminous reflectances, intensities.
     values: Vec<(&'a Array, Vec<f32>)>,
 }
 
@@ -53,7 +53,7 @@ struct Copied {
     values: u32,
 }
 
-/// What the shader of copies reads as `Sizes`.
+/// Uniform that the shader of copies declares as `Sizes`.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Sizes {

@@ -4,9 +4,9 @@
 //! - `normals(key, index, stream, attempt) -> Normals`: k standard normals; or, of a cover,
 //!   `candidate(key, index, stream, attempt) -> Candidate`;
 //! - `worst(z) -> u32`: the largest `excess` of a band before scaling;
-//! - `factor(z) -> f32`: what scales it to the target, where there is one;
+//! - `factor(z) -> f32`: the factor that scales it to the target, where there is one;
 //! - `is_accepted(z) -> bool`;
-//! - `scale(z, key, index, stream) -> f32`: what multiplies a draw's spectrum, where something does.
+//! - `scale(z, key, index, stream) -> f32`: the factor of a draw's spectrum, where it is scaled.
 
 use super::tables::Tables;
 use super::text::{Text, float, list};

@@ -1,4 +1,4 @@
-//! What is asked of a draw.
+//! Options of a recipe.
 
 use clap::ValueEnum;
 use spectroll::{
@@ -13,7 +13,7 @@ pub(in crate::cli) struct RecipeArguments {
     /// 1 for a perfect white
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     pub(in crate::cli) lrv: Option<f64>,
-    /// What must be between 0 and 1 where there is an --lrv
+    /// Spectrum that must be between 0 and 1 where there is an --lrv
     #[arg(long, value_enum, default_value = "base", requires = "lrv")]
     bounds: Bounds,
     /// Multiply the covariance of the weights
@@ -23,7 +23,7 @@ pub(in crate::cli) struct RecipeArguments {
     /// mean powers)
     #[arg(long, value_name = "I", value_parser = intensity)]
     intensity: Option<Intensity>,
-    /// What to write for each draw (comma-separated)
+    /// Quantities to write for each draw (comma-separated)
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", default_value = "spectra")]
     quantities: Vec<Quantity>,
     /// The illuminant of reflectances' XYZ and linear sRGB

@@ -16,7 +16,7 @@ use spectroll::{Grid, Model, Recipe, SpectrumKind, Stream, colorimetry};
 /// The size of a panel; two by two make a picture.
 const PANEL: (f64, f64) = (480.0, 350.0);
 
-/// What a panel leaves for text on its left, right, top and bottom: the same for all, so that their axes align.
+/// Margins of a panel for text on its left, right, top and bottom: the same for all, so that their axes align.
 const MARGINS: [f64; 4] = [50.0, 16.0, 62.0, 46.0];
 
 const HEADING: Heading = Heading { title_size: 16, x: 10.0, title: 24.0, label: 45.0 };
@@ -42,7 +42,7 @@ const NOTHING: f64 = 1e-8;
 
 const ACCENT: &str = "#3b5b7c";
 
-/// What a picture shows.
+/// Contents of a picture.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::cli) struct Picture<'a> {
     /// The model.
@@ -248,7 +248,7 @@ impl Picture<'_> {
     }
 }
 
-/// How a spectrum becomes a colour.
+/// Conversion of a spectrum to a colour.
 enum Colours {
     /// Weights of X, Y and Z that make white of a perfect reflector.
     Reflected([Vec<f64>; 3]),

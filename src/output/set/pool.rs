@@ -30,7 +30,7 @@ pub(super) struct Pool {
     queue: Option<SyncSender<Chunk>>,
     pub(super) done: Receiver<Done>,
     threads: Vec<JoinHandle<()>>,
-    /// Whether waiting chunks are to be dropped.
+    /// Set once waiting chunks are to be dropped.
     stopped: Arc<AtomicBool>,
 }
 
