@@ -21,7 +21,8 @@ impl DrawStatus {
         self.0 & !Self::ABOVE_ONE
     }
 
-    /// Whether scaling to the target took a value of the spectrum to 1 or above (possible under [`Bounds::Base`]).
+    /// Whether scaling to the target took a value of the spectrum to 1 or above (possible under
+    /// [`Bounds::Base`](crate::Bounds::Base)).
     pub fn above_one(self) -> bool {
         self.0 & Self::ABOVE_ONE != 0
     }

@@ -34,15 +34,17 @@ pub struct Grid {
 pub enum GridError {
     #[error("{0:?} is not a grid: write start:step:stop in nm, as in 400:10:700")]
     Syntax(String),
-    #[error("{0} is not a wavelength: every one must be finite and above 0 nm")]
+    #[error("{0} is not a wavelength: wavelengths in nm are finite and above 0")]
     NotAWavelength(f64),
-    #[error("a step of {0} nm does not increase the wavelength")]
+    #[error("a step of {0} nm does not increase the wavelength: it must be above 0")]
     Step(f64),
     #[error("the grid ends at {stop} nm, before it starts at {start} nm: write start:step:stop")]
     Reversed { start: f64, stop: f64 },
-    #[error("{stop} nm is not a whole number of steps of {step} nm from {start} nm")]
+    #[error(
+        "{stop} nm is not a whole number of steps of {step} nm from {start} nm: change the step or an end"
+    )]
     Uneven { start: f64, step: f64, stop: f64 },
-    #[error("a grid of {0} bands: it needs 1 to {MAX_BANDS}")]
+    #[error("a grid of {0} bands: it must have 1 to {MAX_BANDS}")]
     Count(usize),
     #[error("wavelengths must increase, but number {index} is {after} nm after {before} nm")]
     NotIncreasing { index: usize, before: f64, after: f64 },

@@ -61,23 +61,27 @@ pub enum DatasetError {
     Mat { path: PathBuf, reason: String },
     #[error("{path:?} is not readable HDF5: {reason}")]
     Hdf5 { path: PathBuf, reason: String },
-    #[error("{path:?} is not a readable array of NumPy's: {reason}")]
+    #[error("{path:?} is not a readable NumPy array: {reason}")]
     Npy { path: PathBuf, reason: String },
     #[error("{path:?} does not say at which wavelengths its spectra are: give them, as start:step:stop")]
     NoWavelengths { path: PathBuf },
     #[error("{path:?}, line {line}: {reason}")]
     Csv { path: PathBuf, line: u64, reason: String },
     #[error(
-        "{path:?} holds no matrix of spectra with its sampling beside it (X with S_X = [start step count], or a vector wavelength); it holds {found}"
+        "{path:?} holds no matrix of spectra with its wavelengths beside it (X with S_X = [start step count], or a vector wavelength); it holds {found}"
     )]
     NoMatrix { path: PathBuf, found: String },
     #[error("{path:?} holds several matrices of spectra: say which, as in {}:{}", path.display(), candidates[0])]
     Ambiguous { path: PathBuf, candidates: Vec<String> },
-    #[error("{path:?} holds no variable {variable:?} with its sampling beside it; it holds {found}")]
+    #[error("{path:?} holds no matrix {variable:?} with its wavelengths beside it; it holds {found}")]
     NoVariable { path: PathBuf, variable: String, found: String },
-    #[error("{name}: {source}")]
+    #[error(
+        "{name}: {source} (text files have wavelengths in nm in their first column, and a spectrum in each other)"
+    )]
     Wavelengths { name: String, source: GridError },
-    #[error("{name}: {values} values in spectrum {spectrum}, but {wavelengths} wavelengths")]
+    #[error(
+        "{name}: {values} values in spectrum {spectrum}, but {wavelengths} wavelengths: give one value for each"
+    )]
     Length { name: String, spectrum: usize, values: usize, wavelengths: usize },
     #[error(
         "spectrum {spectrum} of {name}: the value at {wavelength} nm is {value}; every value must be finite"

@@ -59,12 +59,13 @@ pub enum EngineError {
     #[error(transparent)]
     Range(#[from] SamplerError),
     #[error(
-        "draw {index} found no acceptable candidate in {attempts} attempts: allow more, or ask for less extreme spectra"
+        "draw {index} found no acceptable candidate in {attempts} attempts: allow more attempts, or ask for less \
+         extreme spectra"
     )]
     Exhausted { index: u64, attempts: u32 },
     #[error(
         "number {element} of {group:?} in scene {scene} found no acceptable candidate in {attempts} attempts: allow \
-         more, or ask for less extreme spectra"
+         more attempts, or ask for less extreme spectra"
     )]
     ExhaustedInScene { group: String, scene: u64, element: u64, attempts: u32 },
 }

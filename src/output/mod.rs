@@ -63,11 +63,11 @@ pub enum OutputError {
     Exists { path: PathBuf },
     #[error("{path:?} is a folder: name a file")]
     Folder { path: PathBuf },
-    #[error("{path:?} is a folder that exists already: name another")]
+    #[error("{path:?} exists already: choose another name")]
     FolderExists { path: PathBuf },
-    #[error("{path:?} is not a folder, and a folder is what would be written: name another")]
+    #[error("{path:?} is not a folder, and this format writes one: choose another name")]
     NotAFolder { path: PathBuf },
-    #[error("{path:?} is not a plain file, and would be replaced by one: name another")]
+    #[error("{path:?} is not a plain file, and would be replaced by one: choose another name")]
     Special { path: PathBuf },
     #[error("{folder:?} does not exist: create it first")]
     NoFolder { folder: PathBuf },
@@ -80,7 +80,8 @@ pub enum OutputError {
     #[error("{path:?}: this build leaves out {what}: build it with the feature {feature}")]
     NotBuilt { path: PathBuf, what: &'static str, feature: &'static str },
     #[error(
-        "{path:?} would be a folder of {count} files, and folders of more than {MOST_FILES} are slow to open and to delete"
+        "{path:?} would be a folder of {count} files, and folders of more than {MOST_FILES} are slow to open and to \
+         delete: choose another format, or write it anyway"
     )]
     ManyFiles { path: PathBuf, count: u64 },
     #[error("{root:?} holds an unfinished data set: resume it, or replace it")]
@@ -149,9 +150,11 @@ impl FileFormat {
         let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
         let of_scenes = schema.row == "scene";
         match self {
-            FileFormat::Npy | FileFormat::Csv | FileFormat::Parquet | FileFormat::Spd if shares => {
-                cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
-            }
+            FileFormat::Npy | FileFormat::Csv | FileFormat::Parquet | FileFormat::Spd if shares => cannot(
+                "these",
+                "rows alone",
+                "repeat the shared arrays in each row, or name it .npz, .zarr or .h5",
+            ),
             FileFormat::Npy if !one && of_scenes => {
                 let remedy = "choose one, or name it .npz, .zarr, .h5 or .parquet";
                 cannot(".npy", "one array", remedy)

@@ -230,7 +230,9 @@ impl Schema {
 
     /// The only field, for formats that hold one.
     pub(super) fn only_field(&self) -> &Field {
-        let [field] = self.fields.as_slice() else { panic!("the format holds one field: see Format::check") };
+        let [field] = self.fields.as_slice() else {
+            panic!("the format holds one field: see FileFormat::check")
+        };
         field
     }
 

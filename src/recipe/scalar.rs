@@ -11,7 +11,7 @@ use crate::random::real::Real;
 use crate::random::stream::Stream;
 
 /// Draws of a recipe, one at a time: in f32 as every engine makes them, in f64 without their rounding errors. See
-/// [`Recipe::scalar`].
+/// [`Recipe::scalar_sampler`](crate::Recipe::scalar_sampler).
 ///
 /// It is also a distribution for code that lives in `rand`: the words then come from any generator, two for each two
 /// normals, rather than from a counter; everything else is the same. See also [`Stream::rng`].

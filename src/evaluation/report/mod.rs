@@ -1,8 +1,8 @@
 //! Report on the cost of draws, their quality, and their behaviour in extreme cases, on one machine and for its
 //! models.
 //!
-//! [`measure`] makes the numbers, which are a document of their own ([`Report`], as JSON); [`page`] makes of them one
-//! page that needs nothing else, and [`figures`] its plots. Every engine is judged by a reference in f64 that shares no
+//! [`measure`] makes the numbers, which are a document of their own ([`Report`], as JSON); [`page()`] makes of them one
+//! page that needs nothing else, and [`figures()`] its plots. Every engine is judged by a reference in f64 that shares no
 //! random word with it, and, value by value, by the f64 draw of the same words.
 
 mod accuracy;
