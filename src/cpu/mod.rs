@@ -44,7 +44,7 @@ pub(crate) struct Kernel<R> {
     outputs: Vec<Output<R>>,
 }
 
-/// An [`Affine`] map of the normals, by four values: so many sums at once keep a core busy, and share what is read of
+/// An [`Affine`] map of the normals, by four values: four sums at once keep a core busy, and share what is read of
 /// the normals. The last value fills the last four up, so that it is no special case.
 struct Map<R> {
     offset: Vec<[R; 4]>,
@@ -95,7 +95,7 @@ struct Mapped<R, const L: usize> {
 }
 
 impl<R: Real, const L: usize> Candidates<R, L> {
-    /// The values of output `number`, without a tally's, and what each is to be multiplied by as it is stored: most
+    /// The values of output `number`, without a status's, and what each is to be multiplied by as it is stored: most
     /// candidates are not, and LLVM makes scatters of such products in lanes.
     #[inline(always)]
     fn output(&self, number: usize, value: &Value<R>) -> (&[[R; L]], [R; L]) {
@@ -161,7 +161,7 @@ impl<R: Real> Kernel<R> {
         self.outputs[0].format.width
     }
 
-    /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
+    /// Draw `index` of a stream: the values of each output, zeros where it failed. The status has none.
     pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, DrawStatus) {
         struct Only<'a, R>(&'a Kernel<R>, Option<(Vec<Vec<R>>, DrawStatus)>);
         impl<R: Real> Take<R, 1> for Only<'_, R> {

@@ -154,7 +154,7 @@ impl<'a> Batch<'a> {
     /// for it.
     ///
     /// # Panics
-    /// Where they are not [`Dtype::F32`]: half spectra, and attempts.
+    /// Where they are not [`Dtype::F32`]: spectra in 16 bits, and attempts.
     pub fn values(&self, quantity: Quantity) -> &'a [f32] {
         let other = |f: &&ArrayFormat| f.quantity == quantity && f.dtype != Dtype::F32;
         if let Some(format) = self.formats.iter().find(other) {

@@ -34,7 +34,7 @@ pub enum ExportError {
     Unfinished {
         /// The error that ended it.
         cause: Box<ExportError>,
-        /// The number of chunks of this process that are finished, and of how many; `None` where that could not be
+        /// The number of this process's chunks that are finished, and of all; `None` where that could not be
         /// written down.
         done: Option<(u64, u64)>,
         /// The folder that holds them.

@@ -1,4 +1,4 @@
-//! A pilot run, which estimates before any work starts how many candidates are accepted.
+//! Pilot run, which estimates the acceptance before any work starts.
 
 use rayon::prelude::*;
 

@@ -15,7 +15,7 @@ pub(super) struct Base {
     pub(super) max_attempts: u32,
 }
 
-/// Lights, so many in each scene.
+/// Group of lights, with their number in each scene.
 #[derive(Clone, Debug)]
 pub struct Illuminants {
     pub(super) base: Base,
@@ -25,14 +25,14 @@ pub struct Illuminants {
     pub(super) same_shape: bool,
 }
 
-/// Reflectances, so many in each scene.
+/// Group of reflectances, with their number in each scene.
 #[derive(Clone, Debug)]
 pub struct Surfaces {
     pub(super) base: Base,
     pub(super) fixed: bool,
 }
 
-/// Reflectances that have something given.
+/// Group of reflectances with a constraint, such as a luminous reflectance.
 #[derive(Clone, Debug)]
 pub struct Targets {
     pub(super) base: Base,
@@ -48,7 +48,7 @@ pub enum Group {
     Illuminants(Illuminants),
     /// Reflectances.
     Surfaces(Surfaces),
-    /// Reflectances that have something given.
+    /// Reflectances with a constraint.
     Targets(Targets),
 }
 
@@ -79,7 +79,7 @@ pub enum TargetConstraint {
 /// Luminous reflectance values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LrvLevels {
-    /// These in turn: scene s has number s modulo how many there are.
+    /// These levels in turn: scene s has number s modulo their number.
     Each(Vec<f64>),
     /// For each target its own, uniform between these.
     Uniform(f64, f64),

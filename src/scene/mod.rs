@@ -84,7 +84,7 @@ pub struct SceneBuilder {
 }
 
 impl Scene {
-    /// Starts a data set of so many scenes, with nothing in them. [`SceneBuilder::build`] ends it.
+    /// Starts a data set of this number of scenes, without groups. [`SceneBuilder::build`] ends it.
     pub fn builder(scenes: u64) -> SceneBuilder {
         SceneBuilder { scenes, seed: 0, wavelengths: None, groups: Vec::new() }
     }

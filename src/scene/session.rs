@@ -16,7 +16,7 @@ use super::Scene;
 use super::group::IntensityScope;
 use super::plan::{Array, Drawing, GroupPlan, Shapes};
 
-/// About how many bytes a window has where no engine draws it.
+/// Approximate size of a window in bytes, where no engine draws it.
 const WINDOW_BYTES: u64 = 8 << 20;
 
 /// Some scenes, with every array that differs between scenes.
@@ -46,7 +46,7 @@ pub struct GroupSummary {
     pub summary: DrawSummary,
 }
 
-/// Spectra and tallies that serve all scenes, one for each element.
+/// Spectra and statuses that serve all scenes, one for each element.
 pub(super) struct SharedSpectra {
     pub(super) spectra: Vec<f32>,
     pub(super) statuses: Vec<DrawStatus>,

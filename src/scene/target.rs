@@ -132,7 +132,7 @@ impl TargetPlan {
         }
     }
 
-    /// Target `element` of `scene`. The stream is in rows of so many as a scene has.
+    /// Target `element` of `scene`. The stream is in rows of as many as a scene has.
     pub(super) fn draw(&self, stream: Stream, scene: u64, element: u32) -> DrawnTarget {
         let row = u64::from(stream.row());
         let at = |scene: u64| scene * row + u64::from(element);

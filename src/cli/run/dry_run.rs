@@ -24,7 +24,7 @@ pub(in crate::cli) struct DryRun {
     output: String,
     draws: u64,
     arrays: Vec<Array>,
-    /// About how many, where they are text.
+    /// Size in bytes; approximate for text.
     bytes: u64,
     /// Number of chunks, and of draws in each; `None` for a single file.
     chunks: Option<(u64, u64)>,

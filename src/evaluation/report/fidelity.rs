@@ -113,7 +113,7 @@ fn above_one(bench: &Bench, name: &str, model: &Model, draws: u64) -> Result<Vec
     }
     for step in 1..=9 {
         let lrv = 0.1 * f64::from(step);
-        bench.say(&format!("{name}: LRV {lrv:.1} under the rule base"))?;
+        bench.say(&format!("{name}: LRV {lrv:.1} under the bounds base"))?;
         let Ok(recipe) = Recipe::builder(model).lrv(lrv).bounds(Bounds::Base).build() else { continue };
         let range = Stream::named(bench.seed, "above one").draws(0..draws);
         let mut count = 0;
