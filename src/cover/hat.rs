@@ -6,7 +6,7 @@ use std::f64::consts::{PI, SQRT_2};
 /// as narrow as half a standard deviation fills this much, and there the quantiles' error is 1e-6 of its width.
 const EFFICIENT: f64 = 0.99;
 
-/// Width below which an interval loses no digits to its middle.
+/// Width below which a mass comes from the middle of its interval, since a difference of tails would lose digits.
 const NARROW: f64 = 1e-3;
 
 /// Probability that a standard normal lies in an interval, to a relative error of 1e-10.

@@ -33,7 +33,7 @@ struct Oracle<'a> {
     scenario: &'a Scenario,
     /// A matrix whose product with its transpose is the covariance.
     root: DMatrix<f64>,
-    /// Luminance of each band under D65, relative to that of a perfect white.
+    /// Luminance of each band of a perfect white under D65; `white` is their sum.
     luminous: Vec<f64>,
     white: f64,
     normal: Normal,
