@@ -20,8 +20,8 @@ const NORMALS: usize = 6;
 pub struct Randomness {
     /// Number of Random123's test vectors that the generator reproduces, and of all.
     pub known_answers: [usize; 2],
-    /// For each engine on an adapter, its index, the number of draws with the same bits as the CPU's in f32, and the number of all
-    /// compared.
+    /// For each engine on an adapter, its index, the number of draws with the same bits as the CPU's in f32, and the
+    /// number of all compared.
     pub same_bits: Vec<(usize, u64, u64)>,
     /// Number of seeds of the generator that are tested.
     pub seeds: u64,
