@@ -7,20 +7,23 @@ struct Draw {
     attempts: u32,
     // What multiplies its spectrum. // if scaled
     scale: f32, // if scaled
+    // The target luminous reflectance that is its own. // if own_targets
+    target_lrv: f32, // if own_targets
 }
 
 // The loop ends by its condition and not by `break`: llvmpipe runs that form a quarter faster.
 fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, max_attempts: u32) -> Draw {
     var result: Draw;
+    result.target_lrv = target_lrv_of(key, index, stream); // if own_targets
     for (var attempt = 0u; attempt < max_attempts && result.attempts == 0u; attempt++) {
         let z = normals(key, index, stream, attempt); // if plain
-        let accepted = is_accepted(z); // if plain
+        let accepted = is_accepted(JUDGED); // if plain
         let c = candidate(key, index, stream, attempt); // if covered
         let z = c.z; // if covered
-        let accepted = c.kept && is_accepted(z); // if covered
+        let accepted = c.kept && is_accepted(JUDGED); // if covered
         result.z = z;
         result.attempts = select(0u, attempt + 1u, accepted);
     }
-    result.scale = scale(result.z, key, index, stream); // if scaled
+    result.scale = scale(SCALED); // if scaled
     return result;
 }

@@ -1,9 +1,7 @@
 // The intensity of an illuminant that is uniform in its logarithm. CPU twin: src/level.rs (`uniform`, `exp2`), the same
 // operations in the same order. Neither exp2 nor ldexp of WGSL: the one may be off by several units in the last place.
 
-fn uniform_of(word: u32) -> f32 {
-    return (f32(word) + 0.5f) * 2.3283064e-10f;
-}
+UNIFORM
 
 fn power_of_two(t: f32) -> f32 {
     let whole = i32(t + 0.5f);

@@ -52,10 +52,10 @@ pub use random::philox::philox;
 pub use random::real::Real;
 pub use random::stream::{DrawRange, Stream, StreamRng};
 pub use recipe::{
-    CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Illuminant, Intensity, ProposalKind, Recipe, RecipeBuilder,
+    CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Illuminant, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder,
     RecipeError, RecipeSettings, ScalarSampler, XyzScale,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
 // What stands in signatures, so that hosts take the same versions.
-pub use {half, nalgebra, rand, wgpu};
 pub use wgsl::WgslError;
+pub use {half, nalgebra, rand, wgpu};

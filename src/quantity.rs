@@ -26,6 +26,8 @@ pub enum Quantity {
     Attempts,
     /// The factor that an illuminant was multiplied by.
     Intensity,
+    /// CIE 1931 chromaticity x and y, of the tristimulus values, whatever their scale.
+    Chromaticity,
 }
 
 impl Quantity {
@@ -38,9 +40,13 @@ impl Quantity {
         Quantity::Lrv,
         Quantity::Attempts,
         Quantity::Intensity,
+        Quantity::Chromaticity,
     ];
 
-    /// Number of quantities.
+    /// Those that tristimulus values give.
+    pub(crate) const COLOURS: &[Quantity] = &[Quantity::Xyz, Quantity::LinearSrgb, Quantity::Chromaticity];
+
+    /// How many there are.
     pub(crate) const COUNT: usize = Quantity::ALL.len();
 
     /// Name of the axis of its values within a draw, in files; `None` where a draw has one value.
@@ -48,7 +54,7 @@ impl Quantity {
         match self {
             Quantity::Spectra => Some("wavelength"),
             Quantity::Weights => Some("component"),
-            Quantity::Xyz | Quantity::LinearSrgb => Some("channel"),
+            Quantity::Xyz | Quantity::LinearSrgb | Quantity::Chromaticity => Some("channel"),
             Quantity::Lrv | Quantity::Attempts | Quantity::Intensity => None,
         }
     }
@@ -58,6 +64,7 @@ impl Quantity {
         match self {
             Quantity::Xyz => &["X", "Y", "Z"],
             Quantity::LinearSrgb => &["R", "G", "B"],
+            Quantity::Chromaticity => &["x", "y"],
             _ => &[],
         }
     }
@@ -72,6 +79,7 @@ impl Quantity {
             Quantity::Lrv => "lrv",
             Quantity::Attempts => "attempts",
             Quantity::Intensity => "intensity",
+            Quantity::Chromaticity => "chromaticity",
         }
     }
 }

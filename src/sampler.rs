@@ -312,3 +312,18 @@ impl Prepared {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use crate::wgsl::layout::{assert_layout, offsets};
+
+    #[test]
+    fn parameters_lie_as_the_shader_reads_them() {
+        let recipe = Recipe::builder(&Model::builtin("granada").unwrap()).build().unwrap();
+        let (text, _) = wgsl::shader(recipe.program(), Dialect::Baseline);
+        let members = offsets!(Parameters: key, first, count, stream, max_attempts, plane, row);
+        assert_layout(&text, "Parameters", &members, size_of::<Parameters>());
+    }
+}

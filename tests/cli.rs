@@ -149,7 +149,7 @@ fn a_report_is_a_folder_that_appears_whole() {
     fails(folder.path(), "report -o mine --quick", 1, "exists already");
     fails(folder.path(), "report -o mine --quick --force", 1, "not a report");
     fails(folder.path(), "report -o x --quick --full", 2, "cannot be used with");
-    fails(folder.path(), "report -o no/such --quick", 1, "cannot write into");
+    fails(folder.path(), "report -o no/such --quick", 1, "create it first");
     fails(folder.path(), "report nonesuch -o x --quick", 2, "neither a file nor a built-in model");
 
     let (out, _) = succeeds(folder.path(), "report granada -o x --quick --engine cpu --seed 5");

@@ -74,15 +74,20 @@ fn hdf5() {
 fn matlab() {
     let folder = tempfile::tempdir().unwrap();
     beside(folder.path(), "b.mat");
-    let load = "import h5py; f = h5py.File('b.mat')\n\
+    let load = "import json, scipy.io; f = scipy.io.loadmat('b.mat')\n\
                 head = open('b.mat', 'rb').read(128)\n\
-                assert head.startswith(b'MATLAB 7.3 MAT-file') and head[124:] == b'\\x00\\x02IM'\n\
-                assert f['S_X'][:].ravel().tolist() == [400, 10, 31] and f['S_X'].shape == (3, 1)\n\
-                assert f['X'].attrs['MATLAB_class'] == b'single' and f['data'] == f['X']\n\
-                assert f['comment'].attrs['MATLAB_class'] == b'char'\n\
-                assert ''.join(map(chr, f['comment'][:].ravel())).startswith('{')";
-    // HDF5's rows are MATLAB's columns.
-    equals(folder.path(), load, "f['X']", "f['wavelength'][0]");
+                assert head.startswith(b'MATLAB 5.0 MAT-file') and head[124:] == b'\\x00\\x01IM'\n\
+                assert f['S_X'].tolist() == [[400, 10, 31]] and f['X'].shape == (31, 1000)\n\
+                assert json.loads(f['comment'][0])['seed'] == 3";
+    equals(folder.path(), load, "np.ascontiguousarray(f['X'].T)", "f['wavelength'][:, 0]");
+    // Labels are rows, a value a draw.
+    let labelled = "sample munsell-vrhel -n 3 --quantities spectra,lrv,weights,attempts --engine cpu";
+    succeeds(folder.path(), &format!("{labelled} -o c.mat --dtype f64"));
+    succeeds(folder.path(), &format!("{labelled} -o c.npz --dtype f64"));
+    let code = "import numpy as np, scipy.io; m, a = scipy.io.loadmat('c.mat'), np.load('c.npz')\n\
+                print([m[n].dtype == a[n].dtype and np.array_equal(m[n].T.squeeze(), a[n])\
+                for n in ['lrv', 'weights', 'attempts']], m['X'].dtype, m['lrv'].shape)";
+    assert_eq!(python(folder.path(), code), "[True, True, True] float64 (1, 3)");
 }
 
 #[test]
@@ -221,6 +226,11 @@ fn fits_read_what_samples_write() {
         4,
         "31 bands do not lie on the 61",
     );
+    // These say what their draws are.
+    for file in ["a.mat", "a.h5"] {
+        let (_, summary) = succeeds(folder, &format!("fit {file} -o kind.json --force"));
+        assert!(summary.contains("of 500 reflectances"), "{summary}");
+    }
     // What MATLAB itself writes is compressed, and of doubles.
     python(
         folder,

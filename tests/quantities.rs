@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use spectroll::{
     ArrayFormat, Bounds, DrawRange, Dtype, Engine, EngineChoice, EngineError, Illuminant, Intensity, Layout,
-    Model, Quantity, Recipe, RecipeBuilder, Stream, XyzScale, colorimetry,
+    Lrv, Model, ProposalKind, Quantity, Recipe, RecipeBuilder, Stream, XyzScale, colorimetry,
 };
 
 /// Draws of each recipe: not a multiple of 4, so that planes have padding and pairs a half.
@@ -48,6 +48,12 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
         ("reflectances under A", reflected(surfaces()).illuminant(Illuminant::A)),
         ("LRV 0.4", reflected(surfaces()).lrv(0.4)),
         ("LRV 0.6, scaled", reflected(surfaces()).lrv(0.6).bounds(Bounds::Scaled)),
+        ("LRV of its own", reflected(surfaces()).lrv(0.2..0.6)),
+        ("LRV of its own, both", reflected(surfaces()).lrv(0.2..0.8).bounds(Bounds::Both)),
+        (
+            "LRV of its own, from a cover",
+            reflected(surfaces()).lrv(0.2..0.6).covariance_scale(25.0).proposal(ProposalKind::Cover),
+        ),
         ("log-uniform lights", shining(lights()).intensity(Intensity::LogUniform(0.15, 150.0))),
         ("measured lights", shining(lights()).intensity(Intensity::Data)),
         ("lights of intensity 3", shining(lights()).intensity(Intensity::Fixed(3.0))),
@@ -99,6 +105,10 @@ fn every_layout_has_the_same_values_on_every_engine() {
             };
             let recipes = [
                 ask(surfaces().quantities(all_but(Quantity::Intensity)).lrv(0.4)),
+                ask(surfaces()
+                    .quantities(all_but(Quantity::Intensity))
+                    .lrv(0.2..0.8)
+                    .bounds([Bounds::Base, Bounds::Scaled, Bounds::Both][i])),
                 ask(lights().quantities(all_but(Quantity::Lrv)).intensity(
                     [Intensity::LogUniform(0.1, 10.0), Intensity::Data, Intensity::Fixed(2.0)][i],
                 )),
@@ -169,6 +179,7 @@ fn what_is_filled_is_what_is_drawn() {
 #[test]
 fn programs_in_loops_have_the_same_values_on_every_engine() {
     use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, SpectrumKind};
+    const LRVS: [Lrv; 2] = [Lrv::Fixed(0.4), Lrv::Uniform(0.2, 0.6)];
     let grid = "390:1:730".parse().expect("a grid");
     let data = Dataset::new(&[BuiltinTable::Vrhel.table()], grid, Extrapolation::Error)
         .expect("the table covers it");
@@ -176,14 +187,14 @@ fn programs_in_loops_have_the_same_values_on_every_engine() {
         Fit::new(SpectrumKind::Reflectance).components(7).fit(&data).expect("the data have that rank");
     let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
     for layout in [Layout::Rows, Layout::PaddedRows, Layout::Planes] {
-        for half in [false, true] {
+        for (half, lrv) in [false, true].into_iter().flat_map(|half| LRVS.map(|lrv| (half, lrv))) {
             let builder =
-                Recipe::builder(&model).quantities(all_but(Quantity::Intensity)).lrv(0.4).layout(layout);
+                Recipe::builder(&model).quantities(all_but(Quantity::Intensity)).lrv(lrv).layout(layout);
             let builder = if half { builder.spectra_dtype(Dtype::F16) } else { builder };
             let recipe = builder.build().expect("it can be drawn");
             let draws = Stream::new(33).draws(0..1003);
             let (ours, theirs) = (values(&cpu(), &recipe, draws), values(gpu(), &recipe, draws));
-            assert!(!software || ours == theirs, "{layout:?}, half: {half}");
+            assert!(!software || ours == theirs, "{layout:?}, half: {half}, {lrv:?}");
         }
     }
 }
@@ -216,11 +227,13 @@ fn values_are_those_of_f64() {
                 xyz = xyz.map(|v| v / xyz[1]);
             }
             let srgb = colorimetry::linear_srgb(xyz);
+            let chromaticity = [0, 1].map(|i| xyz[i] / xyz.iter().sum::<f64>());
             for format in recipe.formats() {
                 let quantity = format.quantity;
                 let expected = match quantity {
                     Quantity::Xyz => &xyz[..],
                     Quantity::LinearSrgb => &srgb[..],
+                    Quantity::Chromaticity => &chromaticity[..],
                     _ => exact.values(quantity),
                 };
                 let peak = match quantity {

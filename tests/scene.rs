@@ -6,11 +6,12 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use spectroll::scene::{
-    Copies, Hue, Illuminants, IntensityScope, LrvLevels, PRESETS, Scene, SceneBuilder, SceneSampler,
-    Surfaces, TargetConstraint, Targets,
+    Copies, GroupKind, Hue, Illuminants, IntensityScope, LrvLevels, PRESETS, PreparedScene, Scene,
+    SceneBuilder, SceneSampler, Surfaces, TargetConstraint, Targets,
 };
 use spectroll::{
-    Bounds, Engine, EngineChoice, EngineError, Grid, Intensity, Model, Recipe, Stream, colorimetry, wgpu,
+    Bounds, Engine, EngineChoice, EngineError, Grid, Intensity, Model, Quantity, Recipe, Stream, colorimetry,
+    wgpu,
 };
 
 #[path = "../examples/host/mod.rs"]
@@ -253,6 +254,110 @@ fn exact_tristimulus_values_are_met_to_1e_5() {
     }
 }
 
+/// Groups that are drawn by the engine, once and on the CPU, asked for all that tristimulus values give.
+fn coloured(quantities: &[Quantity]) -> Scene {
+    let asked = || quantities.iter().copied();
+    let log = Intensity::LogUniform(0.15, 150.0);
+    let lights = |name, count| Illuminants::new(name, &daylight(), count).quantities(asked());
+    let target = |name, aim| Targets::new(name, &surfaces(), aim).quantities(asked());
+    let scene = Scene::builder(100)
+        .seed(9)
+        .group(lights("lights", 3).intensity(log, IntensityScope::Scene))
+        .group(lights("lamps", 2).intensity(Intensity::Fixed(3.0), IntensityScope::Scene))
+        .group(lights("twins", 4).same_shape().intensity(log, IntensityScope::Light))
+        .group(lights("sun", 2).fixed())
+        .group(lights("panels", 4).same_shape().fixed().intensity(log, IntensityScope::Light))
+        .group(Surfaces::new("background", &surfaces(), 9).quantities(asked()))
+        .group(Surfaces::new("walls", &surfaces(), 5).fixed().quantities(asked()))
+        .group(target("target", TargetConstraint::Lrv(LrvLevels::even(0.2, 0.6, 10))).bounds(Bounds::Scaled))
+        .group(target("same", TargetConstraint::Lrv(LrvLevels::even(0.2, 0.6, 10))).copies(Copies::SameShape))
+        .group(target(
+            "hues",
+            TargetConstraint::Hue(Hue { levels: 6, saturation: (0.2, 0.3), lightness: (0.3, 0.4) }),
+        ))
+        .group(Targets::flat("grey", LrvLevels::even(0.2, 0.6, 10)).quantities(asked()));
+    scene.build().expect("it is possible")
+}
+
+/// The same bytes on every engine, and what f64 makes of the spectra, to 1e-6 of the white: of the light itself, where
+/// it is one.
+#[test]
+fn colours_are_those_of_the_spectra() {
+    const COLOURS: [Quantity; 3] = [Quantity::Xyz, Quantity::Chromaticity, Quantity::LinearSrgb];
+    let scene = coloured(&[&[Quantity::Spectra], &COLOURS[..]].concat());
+    let all = arrays(&scene, cpu(), 3..43);
+    if gpu().adapter().is_some_and(|adapter| adapter.kind == "software") {
+        assert!(arrays(&scene, gpu(), 3..43) == all);
+    }
+    let grid = Grid::DEFAULT;
+    let reflected = colorimetry::xyz_weights(grid).expect("it is visible");
+    let emitted = colorimetry::cmf(grid).map(|f| f.iter().map(|v| v * grid.step()).collect::<Vec<_>>());
+    let mut worst = [0f64; 3];
+    for group in scene.groups() {
+        let kind = scene.arrays().find(|array| array.group == group).expect("it has arrays").kind;
+        let is_light = kind == GroupKind::Illuminant;
+        let weights = if is_light { &emitted } else { &reflected };
+        let spectra = floats(&all[group]);
+        let values = COLOURS.map(|quantity| floats(&all[&format!("{group}_{quantity}")]));
+        let count = spectra.len() / 31;
+        for (i, spectrum) in spectra.chunks_exact(31).enumerate() {
+            let dot = |w: &Vec<f64>| w.iter().zip(spectrum).map(|(w, &s)| w * f64::from(s)).sum::<f64>();
+            let xyz = weights.each_ref().map(dot);
+            let white = if is_light { xyz[1] } else { 1.0 };
+            let sum: f64 = xyz.iter().sum();
+            let expected =
+                [xyz.to_vec(), vec![xyz[0] / sum, xyz[1] / sum], colorimetry::linear_srgb(xyz).to_vec()];
+            for (number, expected) in expected.iter().enumerate() {
+                let width = expected.len();
+                // Chromaticities of lights that are fixed are there once, whatever their intensities.
+                let given = values[number].len() / width;
+                assert!(given == count || (number == 1 && count % given == 0), "{group}: {given} of {count}");
+                let scale = if number == 1 { 1.0 } else { white };
+                for (a, b) in values[number][i % given * width..][..width].iter().zip(expected) {
+                    worst[number] = worst[number].max((f64::from(*a) - b).abs() / scale);
+                }
+            }
+        }
+    }
+    println!("XYZ {:.1e}, chromaticity {:.1e}, linear sRGB {:.1e} of white", worst[0], worst[1], worst[2]);
+    assert!(worst.iter().all(|&worst| worst < 2e-6), "{worst:?}");
+}
+
+#[test]
+fn spectra_that_nobody_asks_for_are_in_no_array() {
+    let with = arrays(&coloured(&[Quantity::Spectra, Quantity::Xyz]), cpu(), 0..10);
+    let scene = coloured(&[Quantity::Xyz]);
+    let without = arrays(&scene, cpu(), 0..10);
+    assert!(scene.groups().all(|group| with.contains_key(group) && !without.contains_key(group)));
+    assert!(without.iter().all(|(name, bytes)| with[name] == *bytes));
+    let text = scene.workload(10).left_out.join("\n");
+    assert!(text.contains("background: its spectra are neither computed nor stored"), "{text}");
+    assert!(text.contains("walls: its spectra are not stored"), "{text}");
+    let plain = preset("condition2").workload(10).left_out.join("\n");
+    assert!(!plain.contains("quantities"), "{plain}");
+    let asked = Surfaces::new("walls", &surfaces(), 5).quantities([Quantity::Weights]);
+    let error = Scene::builder(1).group(asked).build().err().expect("no group has weights").to_string();
+    assert!(error.contains("quantities of \"walls\"") && error.contains("spectra, xyz,"), "{error}");
+}
+
+/// A renderer takes the spectra, whatever else is asked for.
+#[test]
+fn a_host_has_spectra_all_the_same() {
+    let (device, queue) = host::device();
+    let expected = arrays(&coloured(&[Quantity::Spectra]), cpu(), 0..2);
+    let scene = coloured(&[Quantity::Xyz]);
+    let sampler = SceneSampler::new(&device, &scene).expect("it is possible");
+    let prepared = sampler.prepare(&device, 0..2).expect("they are few");
+    let mut encoder = device.create_command_encoder(&Default::default());
+    prepared.record(&mut encoder);
+    for (group, found) in read(&device, &queue, encoder, &prepared, &scene) {
+        let expected = floats(&expected[&group]);
+        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * b.abs().max(1.0);
+        assert!(found.len() >= expected.len() && found.iter().zip(&expected).all(close), "{group}");
+    }
+    assert!(prepared.values("hues_xyz").is_some());
+}
+
 /// In a host's encoder the buffers hold what an engine draws.
 #[test]
 fn a_host_records_the_same_scenes() {
@@ -264,6 +369,29 @@ fn a_host_records_the_same_scenes() {
     let prepared = sampler.prepare(&device, 5..9).expect("they are few");
     let mut encoder = device.create_command_encoder(&Default::default());
     prepared.record(&mut encoder);
+    for (group, found) in read(&device, &queue, encoder, &prepared, &scene) {
+        let expected = floats(&expected[&group]);
+        let found = &found[..expected.len()];
+        if software {
+            assert!(found == expected, "{group}");
+        }
+        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * b.abs().max(1.0);
+        assert!(found.iter().zip(&expected).all(close), "{group}");
+    }
+    let intensity = floats(&expected["lights_intensity"]);
+    assert_eq!(prepared.values("lights_intensity"), Some(intensity.as_slice()));
+    assert_eq!(prepared.values("target_lrv"), Some(floats(&expected["target_lrv"]).as_slice()));
+    assert!(prepared.buffer("nonesuch").is_none());
+}
+
+/// The buffer of each group, once what was recorded has run.
+fn read(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    mut encoder: wgpu::CommandEncoder,
+    prepared: &PreparedScene,
+    scene: &Scene,
+) -> Vec<(String, Vec<f32>)> {
     let mut copies = Vec::new();
     for group in scene.groups() {
         let buffer = prepared.buffer(group).expect("it is a group");
@@ -281,20 +409,10 @@ fn a_host_records_the_same_scenes() {
         .iter()
         .for_each(|(_, copy)| copy.map_async(wgpu::MapMode::Read, .., |mapped| mapped.expect("it maps")));
     device.poll(wgpu::PollType::wait_indefinitely()).expect("the device works");
-    for (group, copy) in &copies {
-        let expected = floats(&expected[*group]);
-        let bytes = copy.get_mapped_range(..).expect("it is mapped");
-        let found = floats(&bytes[..4 * expected.len()]);
-        if software {
-            assert!(found == expected, "{group}");
-        }
-        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * b.abs().max(1.0);
-        assert!(found.iter().zip(&expected).all(close), "{group}");
-    }
-    let intensity = floats(&expected["lights_intensity"]);
-    assert_eq!(prepared.values("lights_intensity"), Some(intensity.as_slice()));
-    assert_eq!(prepared.values("target_lrv"), Some(floats(&expected["target_lrv"]).as_slice()));
-    assert!(prepared.buffer("nonesuch").is_none());
+    let values = |(group, copy): (&str, wgpu::Buffer)| {
+        (group.to_owned(), floats(&copy.get_mapped_range(..).expect("it is mapped")))
+    };
+    copies.into_iter().map(values).collect()
 }
 
 #[test]

@@ -120,6 +120,25 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
             "intensity = 2",
             &["line 12, intensity of \"background\"", "there are name, model"],
         ),
+        (
+            "surface",
+            "quantities",
+            "quantities = [\"spectra\", \"chromacity\"]",
+            &["line 12, quantities of \"background\"", "did you mean \"chromaticity\"?", "spectra, xyz,"],
+        ),
+        (
+            "illuminant",
+            "quantities",
+            "quantities = [\"lrv\"]",
+            &["line 8, quantities of \"lights\"", "no \"lrv\""],
+        ),
+        (
+            "target",
+            "quantities",
+            "quantities = []",
+            &["line 16, quantities of \"target\"", "name one at least"],
+        ),
+        ("target", "quantities", "quantities = \"xyz\"", &["line 16, quantities", "a list, as in"]),
         ("surface", "max_attempts", "max_attempts = 0", &["line 12, max_attempts", "at least 1 attempt"]),
         (
             "illuminant",

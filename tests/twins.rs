@@ -11,7 +11,7 @@ use rand::Rng;
 use spectroll::evaluation::statistics::tinted;
 use spectroll::{
     Bounds, BuiltinTable, Dataset, DrawRange, DrawStatus, Engine, EngineChoice, EngineError, Extrapolation,
-    Fit, Grid, Model, ModelParts, Real, Recipe, SpectrumKind, Stream, colorimetry,
+    Fit, Grid, Lrv, Model, ModelParts, Real, Recipe, SpectrumKind, Stream, colorimetry,
 };
 
 /// How far an adapter that fuses may be off, in units in the last place of the largest term.
@@ -31,7 +31,7 @@ fn cpu() -> Engine {
 /// A recipe, and what it was made of.
 struct Case {
     recipe: Recipe,
-    target: Option<(f64, Bounds)>,
+    target: Option<(Lrv, Bounds)>,
     /// The weights of the bands in an LRV.
     lrv_weights: Vec<f64>,
     /// The spectrum at z = 0, and what each normal adds.
@@ -41,6 +41,15 @@ struct Case {
 
 impl Case {
     fn new(model: &Model, target: Option<(f64, Bounds)>, scale: f64) -> Case {
+        Case::with(model, target.map(|(lrv, bounds)| (Lrv::Fixed(lrv), bounds)), scale)
+    }
+
+    /// Of draws that each have a target between the two.
+    fn in_range(model: &Model, low: f64, high: f64, bounds: Bounds) -> Case {
+        Case::with(model, Some((Lrv::Uniform(low, high), bounds)), 1.0)
+    }
+
+    fn with(model: &Model, target: Option<(Lrv, Bounds)>, scale: f64) -> Case {
         let recipe = Recipe::builder(model).covariance_scale(scale);
         let recipe = match target {
             Some((lrv, bounds)) => recipe.lrv(lrv).bounds(bounds),
@@ -67,9 +76,21 @@ impl Case {
             blocks.flat_map(|[a, b, c, d]| [f64::normal_pair(a, b), f64::normal_pair(c, d)].concat());
         let z = DVector::from_iterator(self.gain.ncols(), normals.take(self.gain.ncols()));
         let largest = (self.offset.abs() + self.gain.abs() * z.abs()).max();
-        let factor =
-            self.target.map_or(1.0, |(lrv, _)| lrv / self.lrv((&self.offset + &self.gain * z).as_slice()));
+        let factor = self
+            .target_of(stream, index)
+            .map_or(1.0, |lrv| lrv / self.lrv((&self.offset + &self.gain * z).as_slice()));
         f64::from(f32::EPSILON) * largest * factor
+    }
+
+    /// The target of a draw: the first word of its own block is all that one in a range depends on.
+    fn target_of(&self, stream: Stream, index: u64) -> Option<f64> {
+        match self.target?.0 {
+            Lrv::Fixed(lrv) => Some(lrv),
+            Lrv::Uniform(low, high) => {
+                let word = stream.block(index, 0, 255)[0];
+                Some(low + (high - low) * (f64::from(word) + 0.5) / 2f64.powi(32))
+            }
+        }
     }
 
     fn lrv(&self, spectrum: &[f64]) -> f64 {
@@ -125,15 +146,15 @@ fn compare(case: &Case, draws: DrawRange, a: &Rows, b: &Rows, to_the_bit: bool) 
 }
 
 /// What holds of the draws of every engine: they are physical, and have the LRV that they should.
-fn assert_valid(case: &Case, rows: &Rows) {
+fn assert_valid(case: &Case, draws: DrawRange, rows: &Rows) {
     let model = case.recipe.model();
     let below_one =
         model.kind() == SpectrumKind::Reflectance && !matches!(case.target, Some((_, Bounds::Base)));
-    for (row, status) in rows.spectra.chunks_exact(model.bands()).zip(&rows.statuses) {
+    for (i, (row, status)) in rows.spectra.chunks_exact(model.bands()).zip(&rows.statuses).enumerate() {
         assert!(row.iter().all(|&s| s > 0.0 && s.is_finite() && !(below_one && s >= 1.0)), "{row:?}");
         let above_one = model.kind() == SpectrumKind::Reflectance && row.iter().any(|&s| s >= 1.0);
         assert_eq!(status.above_one(), above_one, "{row:?}");
-        if let Some((lrv, _)) = case.target {
+        if let Some(lrv) = case.target_of(draws.stream, draws.first.wrapping_add(i as u64)) {
             let found = case.lrv(&row.iter().map(|&s| f64::from(s)).collect::<Vec<_>>());
             assert!((found - lrv).abs() < 2e-6, "an LRV of {found} where {lrv} was asked for");
         }
@@ -147,8 +168,8 @@ fn assert_twins(case: &Case, draws: DrawRange) -> Rows {
     if let Err(difference) = compare(case, draws, &ours, &theirs, adapter.kind == "software") {
         panic!("CPU against {adapter}: {difference}");
     }
-    assert_valid(case, &ours);
-    assert_valid(case, &theirs);
+    assert_valid(case, draws, &ours);
+    assert_valid(case, draws, &theirs);
     let bands = case.recipe.model().bands();
     for i in (0..ours.statuses.len()).step_by(draws.count.div_ceil(5000).max(1) as usize) {
         let drawn = case.recipe.draw::<f32>(draws.stream, draws.first.wrapping_add(i as u64));
@@ -187,6 +208,19 @@ fn every_rule_at_a_target_lrv() {
         println!("LRV {lrv} {bounds:?}: {above_one} of 20,001 reach 1 somewhere");
         assert_eq!(above_one > 0, bounds == Bounds::Base);
     }
+}
+
+/// The hardest targets of the last take some 15 candidates, which lanes and threads must not mix up with their draws.
+#[test]
+fn a_target_for_each_draw() {
+    let model = builtin("munsell-vrhel");
+    for bounds in ALL_BOUNDS {
+        assert_twins(&Case::in_range(&model, 0.2, 0.6, bounds), Stream::new(13).draws(0..20_001));
+    }
+    let wide = Case::in_range(&model, 0.01, 0.9, Bounds::Scaled);
+    assert_twins(&wide, Stream::named(13, "wide").draws(u64::MAX - 10_006..));
+    let range = Stream::new(13).in_rows(7).draws(0..4097);
+    assert_twins(&Case::in_range(&tinted(), 0.3, 0.4, Bounds::Both), range);
 }
 
 #[test]
@@ -239,6 +273,7 @@ fn models_too_large_for_straight_lines() {
     assert_twins(&Case::plain(&twelve), draws);
     for bounds in ALL_BOUNDS {
         assert_twins(&Case::new(&twelve, Some((0.6, bounds)), 1.0), draws);
+        assert_twins(&Case::in_range(&twelve, 0.2, 0.6, bounds), draws);
     }
 }
 

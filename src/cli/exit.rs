@@ -78,9 +78,10 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
     if let Some(error) = output {
         return match error {
             OutputError::UnknownFormat { .. } => " (--format)",
-            OutputError::Exists { .. } | OutputError::ManyFiles { .. } | OutputError::Damaged { .. } => {
-                " (--force does)"
-            }
+            OutputError::Exists { .. }
+            | OutputError::FolderExists { .. }
+            | OutputError::ManyFiles { .. }
+            | OutputError::Damaged { .. } => " (--force does)",
             OutputError::Unfinished { .. } => " (--resume or --force)",
             OutputError::Cannot { holds: "one array" | "spectra", .. } => {
                 " (--quantities, or --arrays for scenes)"

@@ -22,6 +22,16 @@ pub(super) fn count(text: &str) -> Result<u64, String> {
     }
 }
 
+/// A seed: a number, or `random` for one that the operating system draws. Parse it once: another time is another seed.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    match text {
+        "random" => getrandom::u64().map_err(|e| format!("the operating system gives no random number: {e}")),
+        number => {
+            number.parse().map_err(|_| "expected a whole number from 0 to 2^64 - 1, or random".to_owned())
+        }
+    }
+}
+
 /// A number with its thousands set apart.
 pub(super) fn grouped(n: u64) -> String {
     HumanCount(n).to_string()
@@ -30,4 +40,19 @@ pub(super) fn grouped(n: u64) -> String {
 /// Bytes in the unit that suits them.
 pub(super) fn size(bytes: u64) -> String {
     DecimalBytes(bytes).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_are_numbers_or_random() {
+        assert_eq!(seed("18446744073709551615"), Ok(u64::MAX));
+        for text in ["-1", "18446744073709551616", "1.5", "", "Random"] {
+            assert_eq!(seed(text).unwrap_err(), "expected a whole number from 0 to 2^64 - 1, or random");
+        }
+        let drawn: std::collections::BTreeSet<_> = (0..8).map(|_| seed("random").unwrap()).collect();
+        assert_eq!(drawn.len(), 8);
+    }
 }

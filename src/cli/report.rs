@@ -1,20 +1,19 @@
 //! `spectroll report`: the cost of draws, their quality and extreme cases, as a page to keep.
 
 use std::cell::RefCell;
-use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressStyle};
 use spectroll::evaluation::report::{Effort, Options, Report, ReportError, Verdict, figures, measure, page};
+use spectroll::output::{FolderMark, PendingFolder};
 use spectroll::{EngineChoice, adapters};
 
 use super::exit::Usage;
 use super::interrupt::{self, Interrupted};
 use super::options::EngineArguments;
-use super::{folder, model};
+use super::{if_exists, model};
 
 /// Measure error against run time, accuracy, randomness and extreme cases, as a page with plots
 ///
@@ -49,7 +48,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.engine.threads.is_some() {
         return Err(Usage("a report uses all cores: leave out --threads".to_owned()).into());
     }
-    let folder = Folder::create(&arguments.output, arguments.force)?;
+    let folder = PendingFolder::create(&arguments.output, if_exists(arguments.force), REPORT)?;
     let options = Options {
         models,
         engines: engines(arguments.engine.choice()),
@@ -119,70 +118,19 @@ fn watched(options: &Options) -> anyhow::Result<Report> {
     }
 }
 
-fn write(folder: &Folder, report: &Report) -> anyhow::Result<()> {
+fn write(folder: &PendingFolder, report: &Report) -> anyhow::Result<()> {
     let figures = figures(report);
-    folder.write("report.html", &page(report, &figures))?;
-    folder.write("report.json", &serde_json::to_string_pretty(report)?)?;
+    folder.write("report.html", page(report, &figures).as_bytes())?;
+    folder.write("report.json", serde_json::to_string_pretty(report)?.as_bytes())?;
     for figure in figures {
-        folder.write(&format!("{}.svg", figure.name), &figure.svg)?;
+        folder.write(format!("{}.svg", figure.name), figure.svg.as_bytes())?;
     }
     Ok(())
 }
 
-/// A folder that appears under its name only when it is complete.
-struct Folder {
-    making: tempfile::TempDir,
-    path: PathBuf,
-    force: bool,
-}
-
-/// File that tells a folder of ours from others, which `--force` must not remove.
-const MARK: &str = "report.json";
-
-impl Folder {
-    fn create(path: &Path, force: bool) -> anyhow::Result<Folder> {
-        check(path, force)?;
-        let parent = folder(path);
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".spectroll-").suffix(".partial");
-        #[cfg(unix)] // as any new folder; by default only its owner could read it
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
-        let making = builder.tempdir_in(parent).map_err(|e| anyhow!("cannot write into {parent:?}: {e}"))?;
-        Ok(Folder { making, path: path.to_owned(), force })
-    }
-
-    fn write(&self, name: &str, text: &str) -> anyhow::Result<()> {
-        let path = self.making.path().join(name);
-        fs::write(&path, text).map_err(|e| anyhow!("cannot write {path:?}: {e}"))
-    }
-
-    fn finish(self) -> anyhow::Result<()> {
-        check(&self.path, self.force)?; // it may have appeared meanwhile
-        if self.path.exists() {
-            fs::remove_dir_all(&self.path).map_err(|e| anyhow!("cannot replace {:?}: {e}", self.path))?;
-        }
-        let making = self.making.keep();
-        let moved = fs::rename(&making, &self.path).map_err(|e| anyhow!("cannot write {:?}: {e}", self.path));
-        if moved.is_err() {
-            let _ = fs::remove_dir_all(making);
-        }
-        moved
-    }
-}
-
-/// Refuses a name that is taken, unless by an earlier report that may be replaced.
-fn check(path: &Path, force: bool) -> anyhow::Result<()> {
-    let is_ours = path.join(MARK).is_file();
-    match (path.symlink_metadata().is_ok(), force) {
-        (true, true) if !is_ours => {
-            Err(anyhow!("{path:?} is not a report, so --force leaves it alone: choose another name"))
-        }
-        (true, false) => {
-            Err(anyhow!("{path:?} exists already: choose another name, or pass --force to replace a report"))
-        }
-        _ => Ok(()),
-    }
-}
+/// What tells a folder of ours from others, which `--force` must not remove.
+const REPORT: FolderMark =
+    FolderMark { name: "a report", is_ours: |path| path.join("report.json").is_file() };
 
 #[cfg(test)]
 mod tests {

@@ -12,7 +12,7 @@ use spectroll::{DrawRange, DrawSummary, EngineChoice, Stream};
 use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, RecipeArguments};
 use super::parse::{count, grouped};
-use super::run::{self, DryRun};
+use super::run::{self, DryRun, folder_of};
 use super::{interrupt, model};
 
 /// Draw spectra from a model
@@ -58,6 +58,8 @@ pub(crate) struct Arguments {
 struct Report {
     model: String,
     output: String,
+    /// How many files of text, in a folder.
+    files: Option<u64>,
     bands: usize,
     wavelengths: String,
     seed: u64,
@@ -88,21 +90,23 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let name = Path::new(&arguments.model).file_name().unwrap_or_default().to_string_lossy();
     let export = DrawExport::new(&recipe, draws).model_name(&name).stream_name(arguments.stream.as_deref());
     let schema = export.schema(&output);
-    output.check(&schema)?;
+    let companions = export.companions();
+    output.check(&schema, &companions)?;
 
     let engine = arguments.engine.open()?;
     if arguments.dry_run {
-        return DryRun::new(&output, &schema, &recipe, &engine)?.print(arguments.json);
+        return DryRun::new(&output, (&schema, &companions), &recipe, &engine)?.print(arguments.json);
     }
     let why = match (arguments.engine.choice().unwrap_or_default(), engine.adapter()) {
         (EngineChoice::Auto, None) => ", no graphics hardware was found",
         _ => "",
     };
 
+    let files = output.text_files(&schema, &companions);
     let start = Instant::now();
     let mut rows = export.rows(&engine)?;
     let writing = interrupt::around(&output, || {
-        Writing::open(&output, schema, &export.companions(), &engine, &mut rows).map_err(run::failed)
+        Writing::open(&output, schema, &companions, &engine, &mut rows).map_err(run::failed)
     })?;
     let outcome = run::make(writing, &mut rows, (arguments.quiet, arguments.output.to_stdout()))?;
     let summary = rows.summary;
@@ -113,6 +117,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &Report {
             model: arguments.model.clone(),
             output: arguments.output.output.display().to_string(),
+            files,
             bands: model.bands(),
             wavelengths: model.grid().to_string(),
             seed: arguments.seed,
@@ -135,7 +140,8 @@ fn report(arguments: &Arguments, outcome: SetStatus, made: &Report) -> anyhow::R
     } else if !arguments.quiet {
         let DrawSummary { draws, attempts, above_one } = made.summary;
         let accepted = made.acceptance.map_or(String::new(), |a| format!(" ({:.4} % accepted)", 100.0 * a));
-        tell!("{}: {} spectra of {} bands", made.output, grouped(draws), made.bands);
+        let folder = made.files.map_or_else(String::new, |files| format!("{}, ", folder_of(files)));
+        tell!("{}: {folder}{} spectra of {} bands", made.output, grouped(draws), made.bands);
         tell!("  {} candidates{accepted}", grouped(attempts));
         if above_one > 0 {
             let share = 100.0 * above_one as f64 / draws as f64;

@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde::Serialize;
-use spectroll::Engine;
 use spectroll::evaluation::plot::PictureFormat;
-use spectroll::export::{ArraySelection, ExportError, Output, SceneExport, Writing};
+use spectroll::export::{ArraySelection, Companions, ExportError, Output, SceneExport, Writing};
 use spectroll::output::{PendingFile, Schema, SetStatus};
 use spectroll::scene::{GroupSummary, PRESETS, Scene, Workload};
+use spectroll::{Engine, Quantity};
 
 use super::exit::Usage;
 use super::interrupt;
 use super::options::{EngineArguments, OutputArguments};
-use super::parse::{grouped, size};
+use super::parse::{grouped, seed, size};
 use super::picture;
 use super::picture::scene::Preview;
-use super::run::{self, free, room};
+use super::run::{self, folder_of, free, room};
 
 /// Draw scenes of lights, surfaces and targets, as a file says
 ///
@@ -34,6 +34,9 @@ pub(crate) struct Arguments {
     /// Use a built-in scene file; without -o, --preview or --dry-run, print it
     #[arg(long, value_name = "NAME", value_parser = PRESETS.map(|(name, _)| name))]
     example: Option<String>,
+    /// Draw with this seed instead of the file's; random takes one from the operating system
+    #[arg(long, value_name = "N|random", value_parser = seed, allow_negative_numbers = true)]
+    seed: Option<u64>,
     /// Draw this group alone
     #[arg(long, value_name = "GROUP")]
     only: Option<String>,
@@ -66,6 +69,8 @@ pub(crate) struct Arguments {
 struct Report {
     scene: String,
     output: Option<String>,
+    /// How many files of text, in a folder.
+    files: Option<u64>,
     wavelengths: String,
     seed: u64,
     scenes: Range<u64>,
@@ -89,7 +94,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let folder = arguments.file.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
     let selection = ArraySelection { only: arguments.only.clone(), arrays: arguments.arrays.clone() };
-    let scene = selection.apply(Scene::parse(&name, &text, folder)?)?;
+    let scene = selection.apply(match arguments.seed {
+        Some(seed) => Scene::parse_seeded(&name, &text, folder, seed)?,
+        None => Scene::parse(&name, &text, folder)?,
+    })?;
     let scenes = arguments.scenes.clone().unwrap_or(0..scene.scenes());
     if scenes.end > scene.scenes() {
         let all = scene.scenes();
@@ -104,15 +112,19 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let export = SceneExport::new(&scene, scenes.clone()).selection(selection.clone()).file(&file, &text);
     let job = Job { arguments, name: &name, scene: &scene, scenes, selection, export };
     // What cannot be written is found out before anything is drawn.
-    let made = if to_somewhere { Some(job.made()?) } else { None };
+    let planned = if to_somewhere { Some(job.planned()?) } else { None };
     let picture = arguments.preview.as_deref().map(|path| job.picture(path)).transpose()?;
     let engine = arguments.engine.open()?;
     if arguments.dry_run {
-        return job.dry_run(&engine);
+        return job.dry_run(&engine, planned.as_ref());
     }
-    match (made, picture) {
-        (Some(made), picture) => job.run(&engine, made, picture),
-        (None, Some(picture)) => picture.make(&job, &engine),
+    match (planned, picture) {
+        (Some(planned), picture) => job.run(&engine, planned, picture),
+        (None, Some(picture)) => {
+            picture.make(&job, &engine)?;
+            job.tell_seed();
+            Ok(())
+        }
         (None, None) => Ok(()),
     }
 }
@@ -150,6 +162,20 @@ struct Job<'a> {
     export: SceneExport<'a>,
 }
 
+/// What is to be written.
+struct Planned {
+    output: Output,
+    schema: Schema,
+    companions: Companions,
+}
+
+impl Planned {
+    /// How many files of text, where they make a folder.
+    fn files(&self) -> Option<u64> {
+        self.output.text_files(&self.schema, &self.companions)
+    }
+}
+
 /// A picture that can be written.
 struct Picture<'a> {
     path: &'a Path,
@@ -169,65 +195,72 @@ impl Job<'_> {
         self.scenes.end - self.scenes.start
     }
 
-    /// Output and schema of the data set, if it can be written.
-    fn made(&self) -> anyhow::Result<(Output, Schema)> {
+    /// What is to be written and how, if that can be.
+    fn planned(&self) -> anyhow::Result<Planned> {
         if self.arguments.json && self.arguments.output.to_stdout() {
             return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
         }
         let output = self.arguments.output.resolve()?;
-        let schema = self.export.schema(&output);
-        output.check(&schema)?;
-        Ok((output, schema))
+        let (schema, companions) = (self.export.schema(&output), self.export.companions());
+        output.check(&schema, &companions)?;
+        Ok(Planned { output, schema, companions })
+    }
+
+    /// Says what the seed is where it is not that of the file.
+    fn tell_seed(&self) {
+        if self.arguments.seed.is_some() && !self.arguments.quiet && !self.arguments.json {
+            tell!("  seed {}", self.scene.seed());
+        }
     }
 
     /// A picture of these scenes at `path`, if it can be written.
     fn picture<'p>(&self, path: &'p Path) -> anyhow::Result<Picture<'p>> {
         let format = picture::format(path)?;
+        let has_spectra = |group: &str| {
+            self.scene.arrays().any(|array| array.group == group && array.quantity == Quantity::Spectra)
+        };
+        if let Some(group) = self.scene.groups().find(|group| !has_spectra(group)) {
+            let text = format!("--preview needs the spectra of {group:?}: add \"spectra\" to its quantities");
+            return Err(Usage(text).into());
+        }
         if !self.arguments.dry_run {
             PendingFile::create(path, self.arguments.output.if_exists())?;
         }
         Ok(Picture { path, format })
     }
 
-    fn run(
-        &self,
-        engine: &Engine,
-        (output, schema): (Output, Schema),
-        picture: Option<Picture>,
-    ) -> anyhow::Result<()> {
+    fn run(&self, engine: &Engine, planned: Planned, picture: Option<Picture>) -> anyhow::Result<()> {
+        let files = planned.files();
+        let Planned { output, schema, companions } = planned;
         let start = Instant::now();
         let mut rows = self.export.rows(engine, &schema)?;
         let writing = interrupt::around(&output, || {
-            Writing::open(&output, schema, &self.export.companions(), engine, &mut rows).map_err(run::failed)
+            Writing::open(&output, schema, &companions, engine, &mut rows).map_err(run::failed)
         })?;
         if let Some(error) = picture.and_then(|picture| picture.make(self, engine).err()) {
             return Err(run::failed(writing.stop(ExportError::Host(error.into()))));
         }
         let (quiet, to_stdout) = (self.arguments.quiet, self.arguments.output.to_stdout());
         let outcome = run::make(writing, &mut rows, (quiet, to_stdout))?;
-        self.report(engine, rows.drawn, outcome, start.elapsed().as_secs_f64())
+        let seconds = start.elapsed().as_secs_f64();
+        self.report(outcome, Report { drawn: rows.drawn, files, seconds, ..self.workload(engine) })
     }
 
-    fn report(
-        &self,
-        engine: &Engine,
-        drawn: Vec<GroupSummary>,
-        outcome: SetStatus,
-        seconds: f64,
-    ) -> anyhow::Result<()> {
+    fn report(&self, outcome: SetStatus, made: Report) -> anyhow::Result<()> {
+        let seconds = made.seconds;
         let report = Report {
             output: Some(self.arguments.output.output.display().to_string()),
-            drawn,
             complete: outcome == SetStatus::Sealed,
-            seconds,
             scenes_per_second: self.count() as f64 / seconds,
-            ..self.workload(engine)
+            ..made
         };
         if self.arguments.json {
             writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
         } else if !self.arguments.quiet {
             let (count, bands) = (grouped(self.count()), self.scene.grid().len());
-            tell!("{}: {count} scenes of {bands} bands", self.arguments.output.output.display());
+            let folder = report.files.map_or_else(String::new, |files| format!("{}, ", folder_of(files)));
+            let name = self.arguments.output.output.display();
+            tell!("{name}: {folder}{count} scenes of {bands} bands");
             for GroupSummary { group, summary } in &report.drawn {
                 let accepted = summary.acceptance().map_or_else(String::new, |share| {
                     format!(", {} candidates ({:.2} % accepted)", grouped(summary.attempts), 100.0 * share)
@@ -237,6 +270,7 @@ impl Job<'_> {
                     tell!("    {} of them reach 1 or more after scaling", grouped(summary.above_one));
                 }
             }
+            self.tell_seed();
             tell!("  {seconds:.2} s, {}", report.engine);
             if let SetStatus::Waiting { done, chunks } = outcome {
                 tell!("  {} of {} chunks are finished", grouped(done), grouped(chunks));
@@ -264,6 +298,7 @@ impl Job<'_> {
         Report {
             scene: self.name.to_owned(),
             output: None,
+            files: None,
             wavelengths: self.scene.grid().to_string(),
             seed: self.scene.seed(),
             scenes: self.scenes.clone(),
@@ -277,13 +312,13 @@ impl Job<'_> {
         }
     }
 
-    fn dry_run(&self, engine: &Engine) -> anyhow::Result<()> {
-        let report = self.workload(engine);
+    fn dry_run(&self, engine: &Engine, planned: Option<&Planned>) -> anyhow::Result<()> {
+        let report = Report { files: planned.and_then(Planned::files), ..self.workload(engine) };
         let mut out = io::stdout();
         if self.arguments.json {
             return Ok(writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?);
         }
-        let Report { scene, workload, engine, .. } = report;
+        let Report { scene, workload, engine, files, .. } = report;
         writeln!(out, "{scene}: {} scenes on {} nm", grouped(self.count()), self.scene.grid())?;
         for group in &workload.groups {
             let by = match (group.shader, group.draws_per_scene, group.draws_once) {
@@ -316,6 +351,9 @@ impl Job<'_> {
             grouped(workload.draws),
             size(workload.bytes)
         )?;
+        if let Some(files) = files {
+            writeln!(out, "  {}: {}", self.arguments.output.output.display(), folder_of(files))?;
+        }
         let output = &self.arguments.output;
         if !output.to_stdout() && output.is_given() {
             writeln!(out, "  {}", room(&output.output, workload.bytes, free(&output.output)))?;

@@ -158,7 +158,7 @@ impl Made {
         let beside = arguments.path.parent().unwrap_or(Path::new(""));
         let folder = arguments.files.as_deref().unwrap_or(beside);
         let remedy = "name the folder of the scene file with --files";
-        let scene = match Scene::parse(&name, &text, folder) {
+        let scene = match Scene::parse_seeded(&name, &text, folder, attributes.read("seed")?) {
             Ok(scene) => attributes.read::<ArraySelection>("selection")?.apply(scene)?,
             Err(error) => return Ok(Err(format!("{error}; {remedy}"))),
         };

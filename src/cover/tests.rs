@@ -7,7 +7,7 @@ use crate::affine::Affine;
 use crate::colorimetry::lrv_weights;
 use crate::model::Model;
 use crate::program::feasibility::{Room, half_spaces, room};
-use crate::program::{self, Bounds, LrvTarget, Program};
+use crate::program::{self, Bounds, LrvLaw, LrvTarget, Program};
 use crate::random::real::Real;
 use crate::random::stream::StreamRng;
 use rand::Rng;
@@ -19,7 +19,7 @@ static SURFACES: LazyLock<Model> = LazyLock::new(|| Model::builtin("munsell-vrhe
 
 fn program(lrv: Option<f64>, covariance_scale: f64) -> Program {
     let weights = lrv_weights(SURFACES.grid()).unwrap();
-    let target = lrv.map(|lrv| LrvTarget { lrv, weights, bounds: Bounds::Scaled });
+    let target = lrv.map(|lrv| LrvTarget { lrv: LrvLaw::Fixed(lrv), weights, bounds: Bounds::Scaled });
     Program {
         target,
         max_attempts: 1000,
@@ -89,7 +89,7 @@ fn is_physical<R: Real>(program: &Program, z: &[R]) -> bool {
         .collect();
     let factor = program.target.as_ref().map_or(R::ONE, |target| {
         let products = target.weights.iter().zip(&spectrum).map(|(&w, &s)| R::from_f64(w) * s);
-        R::from_f64(target.lrv) / products.reduce(|a, b| a + b).unwrap()
+        R::from_f64(target.lrv.largest()) / products.reduce(|a, b| a + b).unwrap()
     });
     spectrum.iter().all(|&s| s * factor > R::ZERO && s * factor < R::ONE)
 }

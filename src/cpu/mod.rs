@@ -14,10 +14,12 @@
 mod columns;
 mod intensity;
 mod lanes;
+mod target;
 
 pub(crate) use columns::fill;
 
 use lanes::{Done, Lanes};
+use target::LrvTarget;
 
 use crate::affine::Affine;
 use crate::cover::BoxMixture;
@@ -33,6 +35,8 @@ pub(crate) struct Kernel<R> {
     spectrum: Map<R>,
     target: Option<LrvTarget<R>>,
     intensity: Option<IntensityLaw<R>>,
+    /// Whether a word of a draw's own has a part in it.
+    reads_draw_block: bool,
     proposal: Option<BoxMixture<R>>,
     /// Upper limit of a physical value before scaling.
     limit: R,
@@ -53,11 +57,6 @@ struct Map<R> {
     components: usize,
 }
 
-struct LrvTarget<R> {
-    lrv: R,
-    weights: Vec<R>,
-}
-
 struct Output<R> {
     format: ArrayFormat,
     value: Value<R>,
@@ -68,6 +67,7 @@ enum Value<R> {
     Spectrum,
     Map(Map<R>, Unit<R>),
     Intensity,
+    TargetLrv,
     Status,
 }
 
@@ -84,7 +84,9 @@ struct Candidates<R, const L: usize> {
     /// The spectrum before it is multiplied by the scale.
     spectrum: Vec<[R; L]>,
     scale: [R; L],
-    /// Values of each output's map; empty where it has none.
+    /// The targets of their draws; 0 where there are none.
+    target_lrv: [R; L],
+    /// For each output; empty where it is no map.
     maps: Vec<Mapped<R, L>>,
 }
 
@@ -103,6 +105,7 @@ impl<R: Real, const L: usize> Candidates<R, L> {
             Value::Spectrum => (&self.spectrum, self.scale),
             Value::Map(..) => (&self.maps[number].values, self.maps[number].unit),
             Value::Intensity => (std::slice::from_ref(&self.scale), [R::ONE; L]),
+            Value::TargetLrv => (std::slice::from_ref(&self.target_lrv), [R::ONE; L]),
             Value::Status => (&[], [R::ONE; L]),
         }
     }
@@ -131,6 +134,7 @@ impl<R: Real> Kernel<R> {
                     Value::Map(Map::new(map), Unit::Over(Map::new(over)))
                 }
                 Source::Intensity => Value::Intensity,
+                Source::TargetLrv => Value::TargetLrv,
                 Source::Status => Value::Status,
             },
         };
@@ -140,11 +144,9 @@ impl<R: Real> Kernel<R> {
         };
         Kernel {
             spectrum: Map::new(&program.spectrum),
-            target: program
-                .target
-                .as_ref()
-                .map(|t| LrvTarget { lrv: R::from_f64(t.lrv), weights: round(&t.weights) }),
+            target: program.target.as_ref().map(LrvTarget::new),
             intensity: program.intensity.as_ref().map(IntensityLaw::rounded),
+            reads_draw_block: program.reads_draw_block(),
             proposal: program.proposal.as_ref().map(BoxMixture::rounded),
             limit,
             tests_scaled: program.tests_scaled(),
@@ -183,7 +185,7 @@ impl<R: Real> Kernel<R> {
     ) -> Option<(Vec<Vec<R>>, DrawStatus)> {
         let mut candidates = self.candidates::<1>();
         let kept = self.propose(&mut candidates, &mut block);
-        let word = self.intensity.as_ref().map(|_| [block(stream::DRAW_BLOCK)[0]]);
+        let word = if self.reads_draw_block { [block(stream::DRAW_BLOCK)[0]] } else { [0] };
         let verdicts = self.judge(&mut candidates, kept, word);
         let status = DrawStatus::accepted(attempt, verdicts.above_one[0]);
         verdicts.accepted[0].then(|| (self.values(&candidates, status), status))
@@ -214,10 +216,10 @@ impl<R: Real> Kernel<R> {
         while lanes.are_busy() {
             let words = lanes.words();
             let kept = self.propose(&mut candidates, words);
-            let word = if self.intensity.is_some() {
-                Some(Attempts { attempts: [0; L], ..words }.block(stream::DRAW_BLOCK)[0])
+            let word = if self.reads_draw_block {
+                Attempts { attempts: [0; L], ..words }.block(stream::DRAW_BLOCK)[0]
             } else {
-                None
+                [0; L]
             };
             let verdicts = self.judge(&mut candidates, kept, word);
             to.take(lanes.advance(&verdicts, self.max_attempts), &candidates);
@@ -234,6 +236,7 @@ impl<R: Real> Kernel<R> {
             normals: vec![[R::ZERO; L]; self.spectrum.components.next_multiple_of(2)],
             spectrum: vec![[R::ZERO; L]; 4 * self.spectrum.offset.len()],
             scale: [R::ONE; L],
+            target_lrv: [R::ZERO; L],
             maps: maps.collect(),
         }
     }
@@ -250,14 +253,14 @@ impl<R: Real> Kernel<R> {
         }
     }
 
-    /// Makes the candidates that were proposed, with the words of their levels if there are any, and judges those that
-    /// were kept.
+    /// Makes the candidates that were proposed, each with the word of its draw's own if one is read, and judges those
+    /// that were kept.
     #[inline(always)]
     fn judge<const L: usize>(
         &self,
         candidates: &mut Candidates<R, L>,
         kept: [bool; L],
-        word: Option<[u32; L]>,
+        word: [u32; L],
     ) -> Verdicts<L> {
         self.spectrum.apply(&candidates.normals, &mut candidates.spectrum);
         let physical = Range::of(&candidates.spectrum);
@@ -267,15 +270,16 @@ impl<R: Real> Kernel<R> {
             verdicts.accepted[l] &= physical.is_within(l, self.limit);
         }
         if let Some(target) = &self.target {
-            candidates.scale = target.factor(&candidates.spectrum);
+            candidates.target_lrv = target.of(&word);
+            candidates.scale = target.factor(&candidates.spectrum, &candidates.target_lrv);
             for l in 0..L {
                 let peak = physical.high[l] * candidates.scale[l];
                 verdicts.accepted[l] &= !self.tests_scaled || peak < R::ONE;
                 verdicts.above_one[l] = self.may_exceed_one && peak >= R::ONE;
             }
-        } else if let Some((level, word)) = self.intensity.as_ref().zip(word) {
+        } else if let Some(law) = &self.intensity {
             for l in 0..L {
-                candidates.scale[l] = level.of(word[l]);
+                candidates.scale[l] = law.of(word[l]);
             }
         }
         for (output, mapped) in self.outputs.iter().zip(&mut candidates.maps) {
@@ -330,24 +334,6 @@ impl<R: Real> Map<R> {
             }
             *values = sums;
         }
-    }
-}
-
-impl<R: Real> LrvTarget<R> {
-    /// Factor that scales spectra to the target.
-    #[inline(always)]
-    fn factor<const L: usize>(&self, spectrum: &[[R; L]]) -> [R; L] {
-        let mut lrv = [R::ZERO; L];
-        for (b, (&weight, s)) in self.weights.iter().zip(spectrum).enumerate() {
-            for l in 0..L {
-                let product = weight * s[l];
-                lrv[l] = if b == 0 { product } else { lrv[l] + product }; // in the order of the bands
-            }
-        }
-        for lrv in &mut lrv {
-            *lrv = self.lrv / floored(*lrv);
-        }
-        lrv
     }
 }
 

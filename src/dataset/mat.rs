@@ -9,10 +9,11 @@ use std::path::Path;
 
 use matfile::{MatFile, NumericData};
 
-use super::matrix::{self, Matrix};
+use super::matrix::{self, Matrices, Matrix};
 use super::{DatasetError, MAX_BYTES, Table};
 
 const HEADER: usize = 128;
+const CHAR: u32 = 4;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
@@ -24,8 +25,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], variable: Option<&str>) -> Result<
     matrix::choose(path, &matrices, variable)
 }
 
-/// Every real numeric matrix of the file, in order.
-fn matrices(path: &Path, bytes: &[u8]) -> Result<Vec<Matrix>, DatasetError> {
+/// Every real numeric matrix of the file, in order, and what its comment says.
+fn matrices(path: &Path, bytes: &[u8]) -> Result<Matrices, DatasetError> {
     let failed = |reason: &str| DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() };
     let little_endian = endianness(bytes).map_err(failed)?;
     let word = |at: &[u8], i: usize| -> Option<u32> {
@@ -33,7 +34,7 @@ fn matrices(path: &Path, bytes: &[u8]) -> Result<Vec<Matrix>, DatasetError> {
         Some(if little_endian { u32::from_le_bytes(word) } else { u32::from_be_bytes(word) })
     };
 
-    let mut matrices = Vec::new();
+    let mut matrices = Matrices::default();
     let mut unpacked = 0;
     let mut rest = &bytes[HEADER..];
     while rest.len() >= 8 {
@@ -53,7 +54,10 @@ fn matrices(path: &Path, bytes: &[u8]) -> Result<Vec<Matrix>, DatasetError> {
             _ => &rest[..8 + size],
         };
         if is_numeric_matrix(element, word) {
-            matrices.extend(decode(&bytes[..HEADER], element));
+            matrices.all.extend(decode(&bytes[..HEADER], element));
+        } else if word(element, 4).is_some_and(|flags| flags & 0xFF == CHAR) {
+            let text = text(element, word).filter(|(name, _)| name == matrix::COMMENT);
+            matrices.kind = text.and_then(|(_, text)| matrix::kind(&text)).or(matrices.kind);
         }
         rest = &rest[8 + size..];
         if kind != COMPRESSED {
@@ -70,12 +74,12 @@ fn is_hdf5(bytes: &[u8]) -> bool {
 }
 
 #[cfg(feature = "hdf5")]
-fn hdf5(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
+fn hdf5(path: &Path) -> Result<Matrices, DatasetError> {
     super::hdf5::matrices(path)
 }
 
 #[cfg(not(feature = "hdf5"))]
-fn hdf5(path: &Path) -> Result<Vec<Matrix>, DatasetError> {
+fn hdf5(path: &Path) -> Result<Matrices, DatasetError> {
     let reason =
         "this build leaves out HDF5: build it with the feature hdf5, or resave with save(file, '-v7')";
     Err(DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() })
@@ -118,11 +122,44 @@ fn is_numeric_matrix(element: &[u8], word: impl Fn(&[u8], usize) -> Option<u32>)
         && dimensions().is_some_and(|values| values <= element.len() as u64)
 }
 
-/// Decodes one element; `None` where it is not two-dimensional or not readable.
+/// The name and the text of an array of characters.
+fn text(element: &[u8], word: impl Fn(&[u8], usize) -> Option<u32>) -> Option<(String, String)> {
+    const UTF16: [u32; 2] = [4, 17]; // and numbers of 16 bits, which is what MATLAB itself writes
+    const BYTES: [u32; 3] = [1, 2, 16];
+    // The parts of an array: its flags, its dimensions, its name and its values. Up to four bytes stand in the tag.
+    let mut rest = element.get(8..)?;
+    let mut parts = Vec::new();
+    while parts.len() < 4 {
+        let tag = word(rest, 0)?;
+        let (kind, start, size) = match tag >> 16 {
+            0 => (tag, 8usize, word(rest, 1)? as usize),
+            size => (tag & 0xFFFF, 4, size as usize),
+        };
+        parts.push((kind, rest.get(start..start.checked_add(size)?)?));
+        rest = rest.get((start + size).next_multiple_of(8)..).unwrap_or_default();
+    }
+    let [_, _, (_, name), (kind, bytes)] = parts[..] else { return None };
+    let text = match kind {
+        kind if BYTES.contains(&kind) => String::from_utf8(bytes.to_vec()).ok()?,
+        kind if UTF16.contains(&kind) => {
+            let is_little = word(&[1, 0, 0, 0], 0) == Some(1);
+            let unit = |pair: &[u8; 2]| {
+                if is_little { u16::from_le_bytes(*pair) } else { u16::from_be_bytes(*pair) }
+            };
+            String::from_utf16(&bytes.as_chunks().0.iter().map(unit).collect::<Vec<_>>()).ok()?
+        }
+        _ => return None,
+    };
+    Some((String::from_utf8(name.to_vec()).ok()?, text))
+}
+
+/// The matrix of one element, or nothing where it is not readable. Of more than two dimensions, those after the first
+/// count as one: spectra stand in columns however many sizes say which is which.
 fn decode(header: &[u8], element: &[u8]) -> Option<Matrix> {
     let file = MatFile::parse([header, element].concat().as_slice()).ok()?;
     let [array] = file.arrays().as_slice() else { return None };
-    let &[rows, columns] = array.size().as_slice() else { return None };
+    let [rows, others @ ..] = array.size().as_slice() else { return None };
+    let (rows, columns) = (*rows, others.iter().try_fold(1usize, |product, n| product.checked_mul(*n))?);
     let values: Vec<f64> = match array.data() {
         NumericData::Double { real, .. } => real.clone(),
         NumericData::Single { real, .. } => real.iter().map(|&v| v.into()).collect(),

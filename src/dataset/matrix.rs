@@ -16,10 +16,31 @@ pub(super) struct Matrix {
     pub(super) values: Vec<f64>,
 }
 
-/// Returns the table of the matrix that `variable` names, or of the only one with its sampling beside it.
+/// What a file holds.
+#[derive(Default)]
+pub(super) struct Matrices {
+    /// Its numeric arrays.
+    pub(super) all: Vec<Matrix>,
+    /// The kind of the draws, where it is a data set of this program.
+    pub(super) kind: Option<SpectrumKind>,
+}
+
+/// The variable in which data sets of this program say what they were made from, in JSON.
+pub(super) const COMMENT: &str = "comment";
+
+/// The names of draws in data sets of this program.
+const DRAWS: [&str; 2] = ["X", "spectra"];
+
+/// The kind that the comment of a data set of this program records.
+pub(super) fn kind(comment: &str) -> Option<SpectrumKind> {
+    let mut attributes: serde_json::Value = serde_json::from_str(comment).ok()?;
+    serde_json::from_value(attributes.get_mut("kind")?.take()).ok()
+}
+
+/// The table of the matrix that `variable` names, or of the only one with its sampling beside it.
 pub(super) fn choose(
     path: &Path,
-    matrices: &[Matrix],
+    Matrices { all: matrices, kind }: &Matrices,
     variable: Option<&str>,
 ) -> Result<Table, DatasetError> {
     let mut samplings: Vec<_> = matrices.iter().filter_map(sampling).collect();
@@ -31,7 +52,7 @@ pub(super) fn choose(
         .filter_map(|m| Some((m, grid_of(m, &samplings)?)))
         .filter(|(m, _)| variable.is_none_or(|v| v == m.name))
         .collect();
-    let found = || match matrices {
+    let found = || match matrices.as_slice() {
         [] => "no numeric matrix".to_owned(),
         all => all
             .iter()
@@ -41,7 +62,11 @@ pub(super) fn choose(
     };
     let path = path.to_owned();
     match (spectra.as_slice(), variable) {
-        ([(matrix, grid)], _) => table(&format!("{path:?}:{}", matrix.name), matrix, *grid),
+        ([(matrix, grid)], _) => {
+            let mut table = table(&format!("{path:?}:{}", matrix.name), matrix, *grid)?;
+            table.kind = table.kind.or(kind.filter(|_| DRAWS.contains(&matrix.name.as_str())));
+            Ok(table)
+        }
         ([], None) => Err(DatasetError::NoMatrix { path, found: found() }),
         ([], Some(v)) => Err(DatasetError::NoVariable { path, variable: v.to_owned(), found: found() }),
         (several, _) => {

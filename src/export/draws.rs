@@ -7,12 +7,11 @@ use serde_json::{Map, Value, json};
 
 use super::provenance::{Sum, model_sum, shader_sum};
 use super::{Companions, ExportError, Output, Rows, Window, Writing};
-use crate::dataset::SpectrumKind;
 use crate::engine::{Batch, DrawSummary, Engine, EngineError, Session};
-use crate::output::{Field, Schema, SharedArray, SpdName};
+use crate::output::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
 use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::{DrawRange, Stream};
-use crate::recipe::Recipe;
+use crate::recipe::{Lrv, Recipe};
 
 /// Draws of a recipe that are to be written.
 #[derive(Clone, Debug)]
@@ -54,13 +53,17 @@ impl<'a> DrawExport<'a> {
 
     /// Files beside the rows.
     pub fn companions(&self) -> Companions {
-        let spd = match (self.recipe.model().kind(), self.recipe.settings().lrv) {
-            (SpectrumKind::Illuminant, _) => SpdName::Illuminant,
-            (SpectrumKind::Reflectance, None) => SpdName::Reflectance,
-            (SpectrumKind::Reflectance, Some(lrv)) => SpdName::ReflectanceAt(lrv),
+        let spectra = SpectraArray {
+            name: Quantity::Spectra.name().to_owned(),
+            group: None,
+            kind: self.recipe.model().kind(),
+            lrv: match self.recipe.settings().lrv {
+                Some(Lrv::Fixed(lrv)) => LrvLabel::Same(lrv),
+                None | Some(Lrv::Uniform(..)) => LrvLabel::None,
+            },
         };
         let files = vec![("_model.json", self.recipe.model().to_json())];
-        Companions { spd: (spd, self.draws.first), files }
+        Companions { spectra: vec![spectra], first: self.draws.first, files }
     }
 
     /// Prepares the rows, to be drawn by an engine.
@@ -70,10 +73,10 @@ impl<'a> DrawExport<'a> {
 
     /// Draws and writes the whole data set.
     pub fn write(&self, engine: &'a Engine, output: &Output) -> Result<DrawSummary, ExportError> {
-        let schema = self.schema(output);
-        output.check(&schema)?;
+        let (schema, companions) = (self.schema(output), self.companions());
+        output.check(&schema, &companions)?;
         let mut rows = self.rows(engine)?;
-        let writing = Writing::open(output, schema, &self.companions(), engine, &mut rows)?;
+        let writing = Writing::open(output, schema, &companions, engine, &mut rows)?;
         writing.run(&mut rows, &mut |_| ControlFlow::Continue(()))?;
         Ok(rows.summary)
     }

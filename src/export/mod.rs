@@ -33,7 +33,7 @@ pub use scenes::{ArraySelection, SceneExport, SceneRows, SelectionError, model_s
 pub use writing::{ExportError, Writing};
 
 use crate::engine::EngineError;
-use crate::output::{SharedArray, SpdName};
+use crate::output::{SharedArray, SpectraArray};
 
 /// Rows of a data set, as an engine draws them: draws, or scenes.
 pub trait Rows {
@@ -51,11 +51,13 @@ pub trait Rows {
 /// Takes the columns of some rows, and their number.
 pub type Window<'a> = dyn FnMut(&[&[u8]], u64) -> Result<(), ExportError> + 'a;
 
-/// Parts of an export beside its rows.
+/// What formats need to know of a data set besides its rows, and what it leaves beside them.
 #[derive(Clone, Debug)]
 pub struct Companions {
-    /// The names of `.spd` files, and the number of the first row among them.
-    pub(crate) spd: (SpdName, u64),
+    /// The arrays of spectra.
+    pub(crate) spectra: Vec<SpectraArray>,
+    /// The number of the first row.
+    pub(crate) first: u64,
     /// Small files that lie beside the chunks of a set, by name.
     pub(crate) files: Vec<(&'static str, String)>,
 }

@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::output::{ChunkFormat, FileFormat, IfExists, OutputError, Schema, SetMode, SetPlan, Shard};
+use super::Companions;
+use crate::output::{
+    ChunkFormat, FileFormat, IfExists, OutputError, Schema, SetMode, SetPlan, Shard, spd_files,
+};
 use crate::quantity::Dtype;
 
 /// The kind of thing that is written.
@@ -23,11 +26,11 @@ impl Destination {
     /// Whether what all rows share can be kept once, rather than in every row.
     pub fn holds_shared_arrays(self) -> bool {
         match self {
-            Destination::Stdout(_) | Destination::SpdFolder | Destination::Set(ChunkFormat::Parquet) => false,
+            Destination::Stdout(_) | Destination::Set(ChunkFormat::Parquet) => false,
             Destination::File(format) => {
                 !matches!(format, FileFormat::Csv | FileFormat::Parquet | FileFormat::Npy)
             }
-            Destination::Set(_) => true,
+            Destination::SpdFolder | Destination::Set(_) => true,
         }
     }
 }
@@ -104,12 +107,18 @@ impl Output {
     }
 
     /// Refuses what the destination cannot hold.
-    pub fn check(&self, schema: &Schema) -> Result<(), OutputError> {
+    pub fn check(&self, schema: &Schema, companions: &Companions) -> Result<(), OutputError> {
+        let file = |format: FileFormat| format.check(&self.path, schema, &companions.spectra);
         match self.destination {
-            Destination::Stdout(format) | Destination::File(format) => format.check(&self.path, schema),
-            Destination::SpdFolder => FileFormat::Spd.check(&self.path, schema),
+            Destination::Stdout(format) | Destination::File(format) => file(format),
+            Destination::SpdFolder => file(FileFormat::Spd),
             Destination::Set(chunks) => chunks.check(&self.path, schema),
         }
+    }
+
+    /// The number of files in a folder of text files; `None` of anything else.
+    pub fn text_files(&self, schema: &Schema, companions: &Companions) -> Option<u64> {
+        (self.destination == Destination::SpdFolder).then(|| spd_files(schema, &companions.spectra))
     }
 
     /// The plan of a set; `None` of anything else.

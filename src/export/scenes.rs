@@ -8,9 +8,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::provenance::{Sum, model_sum};
-use super::{Companions, ExportError, Output, Rows, Window, Writing};
+use super::{Companions, Destination, ExportError, Output, Rows, Window, Writing};
+use crate::dataset::SpectrumKind;
 use crate::engine::{Engine, EngineError};
-use crate::output::{Field, Schema, SharedArray, SpdName};
+use crate::output::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
+use crate::quantity::Quantity;
 use crate::scene::{Array, GroupKind, GroupSummary, Scene, SceneSession};
 
 /// Approximate number of spectra that tell how an engine rounds, and the largest number of scenes for them.
@@ -94,7 +96,12 @@ impl<'a> SceneExport<'a> {
     /// yet.
     pub fn schema(&self, output: &Output) -> Schema {
         let holds_shared = output.destination().holds_shared_arrays();
-        let wanted = || self.scene.arrays().filter(|array| self.selection.has(array));
+        let is_text = output.destination() == Destination::SpdFolder;
+        let has = |array: &Array| match is_text {
+            true => self.is_text(array),
+            false => self.selection.has(array),
+        };
+        let wanted = || self.scene.arrays().filter(|array| has(array));
         let varying = wanted().filter(|array| array.per_scene);
         let (shared, repeated): (Vec<_>, Vec<_>) =
             wanted().filter(|array| !array.per_scene).partition(|_| holds_shared);
@@ -110,12 +117,35 @@ impl<'a> SceneExport<'a> {
 
     /// Files beside the rows.
     pub fn companions(&self) -> Companions {
-        let spd = match self.scene.arrays().find(|array| self.selection.has(array)).map(|array| array.kind) {
-            Some(GroupKind::Illuminant) => SpdName::Illuminant,
-            _ => SpdName::Reflectance,
-        };
         let files = self.file.iter().map(|(_, text)| ("_scene.toml", text.clone())).collect();
-        Companions { spd: (spd, self.scenes.start), files }
+        Companions { spectra: self.spectra().collect(), first: self.scenes.start, files }
+    }
+
+    /// The arrays of spectra that are wanted.
+    fn spectra(&self) -> impl Iterator<Item = SpectraArray> {
+        let is_spectra = |array: &&Array| array.quantity == Quantity::Spectra && self.selection.has(array);
+        self.scene.arrays().filter(is_spectra).map(|array| SpectraArray {
+            name: array.name.clone(),
+            group: Some(array.group.clone()),
+            kind: match array.kind {
+                GroupKind::Illuminant => SpectrumKind::Illuminant,
+                GroupKind::Surface | GroupKind::Target => SpectrumKind::Reflectance,
+            },
+            lrv: self.lrv(&array.group).map_or(LrvLabel::None, |lrv| LrvLabel::Field(lrv.name.clone())),
+        })
+    }
+
+    /// The luminous reflectances of a group, where they are known.
+    fn lrv(&self, group: &str) -> Option<&Array> {
+        self.scene.arrays().find(|array| array.group == group && array.quantity == Quantity::Lrv)
+    }
+
+    /// Whether a folder of text files has an array, be it in their names: where none is named, all spectra and their
+    /// labels.
+    fn is_text(&self, array: &Array) -> bool {
+        let labels = |spectra: &SpectraArray| spectra.lrv == LrvLabel::Field(array.name.clone());
+        let is_named = !self.selection.arrays.is_empty() && self.selection.has(array);
+        is_named || self.spectra().any(|spectra| spectra.name == array.name || labels(&spectra))
     }
 
     /// The rows, to be drawn by an engine.
@@ -125,10 +155,10 @@ impl<'a> SceneExport<'a> {
 
     /// Draws and writes the whole.
     pub fn write(&self, engine: &'a Engine, output: &Output) -> Result<Vec<GroupSummary>, ExportError> {
-        let schema = self.schema(output);
-        output.check(&schema)?;
+        let (schema, companions) = (self.schema(output), self.companions());
+        output.check(&schema, &companions)?;
         let mut rows = self.rows(engine, &schema)?;
-        let writing = Writing::open(output, schema, &self.companions(), engine, &mut rows)?;
+        let writing = Writing::open(output, schema, &companions, engine, &mut rows)?;
         writing.run(&mut rows, &mut |_| ControlFlow::Continue(()))?;
         Ok(rows.drawn)
     }

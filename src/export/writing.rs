@@ -82,10 +82,12 @@ impl Writing {
                 Sink::Csv(csv.map_err(ExportError::Stdout)?)
             }
             Destination::Stdout(format) => unreachable!("{format:?} is not streamed"),
-            Destination::File(format) => Sink::File(FileWriter::create(path, format, &schema, if_exists)?),
+            Destination::File(format) => {
+                Sink::File(FileWriter::create(path, format, &schema, &companions.spectra, if_exists)?)
+            }
             Destination::SpdFolder => {
-                let (name, first) = companions.spd;
-                Sink::Spd(SpdFolder::create(path, &schema, name, first, if_exists)?)
+                let Companions { spectra, first, .. } = companions;
+                Sink::Spd(SpdFolder::create(path, &schema, spectra, *first, if_exists)?)
             }
             Destination::Set(_) => {
                 let plan = output.plan(&schema).expect("the destination is a set");

@@ -7,7 +7,6 @@
 mod csv;
 #[cfg(feature = "hdf5")]
 mod h5;
-#[cfg(feature = "hdf5")]
 mod mat;
 mod npy;
 mod npz;
@@ -23,10 +22,10 @@ use std::path::{Path, PathBuf};
 
 use crate::quantity::Dtype;
 
-pub use pending::{IfExists, PendingFile, write_file};
-pub use schema::{Field, Schema, SharedArray};
+pub use pending::{FolderMark, IfExists, PendingFile, PendingFolder, write_file};
+pub use schema::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
 pub use set::{ChunkFormat, Progress, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge};
-pub use spd::{MOST_FILES, SpdFolder, SpdName};
+pub use spd::{MOST_FILES, SpdFolder, files as spd_files};
 
 /// File format of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,13 +41,13 @@ pub enum FileFormat {
     /// HDF5, chunked by draws.
     #[cfg_attr(feature = "cli", value(name = "h5"))]
     Hdf5,
-    /// MATLAB v7.3.
+    /// MATLAB: v5 where every variable is below 2 GB, and v7.3 above.
     Mat,
     /// Parquet: one column per quantity.
     Parquet,
     /// A Zarr store, version 3.
     Zarr,
-    /// A folder of text files, one per spectrum.
+    /// A folder of text files, one a spectrum, in a folder for each group of a scene.
     Spd,
 }
 
@@ -63,9 +62,11 @@ pub enum OutputError {
     Exists { path: PathBuf },
     #[error("{path:?} is a folder: name a file")]
     Folder { path: PathBuf },
-    #[error("{path:?} exists already: choose another name")]
+    #[error("{path:?} is a folder that exists already: name another, or replace it")]
     FolderExists { path: PathBuf },
-    #[error("{path:?} is not a folder, and this format writes one: choose another name")]
+    #[error("{path:?} is not {expected}, so it is left alone: name another")]
+    NotOurs { path: PathBuf, expected: &'static str },
+    #[error("{path:?} is not a folder, and a folder is what would be written: name another")]
     NotAFolder { path: PathBuf },
     #[error("{path:?} is not a plain file, and would be replaced by one: choose another name")]
     Special { path: PathBuf },
@@ -133,11 +134,15 @@ impl FileFormat {
         }
     }
 
-    /// Returns an error where the format cannot hold a schema, or was left out of this build.
-    pub fn check(self, path: &Path, schema: &Schema) -> Result<(), OutputError> {
+    /// An error where the format cannot hold what a schema says, of which `spectra` are spectra, or was left out of this
+    /// build.
+    pub fn check(self, path: &Path, schema: &Schema, spectra: &[SpectraArray]) -> Result<(), OutputError> {
         let path = path.to_owned();
         let built = match self {
-            FileFormat::Hdf5 | FileFormat::Mat => (cfg!(feature = "hdf5"), "HDF5", "hdf5"),
+            FileFormat::Hdf5 => (cfg!(feature = "hdf5"), "HDF5", "hdf5"),
+            FileFormat::Mat if !mat::fits_v5(schema, mat::V5_BYTES) => {
+                (cfg!(feature = "hdf5"), "MATLAB v7.3, for variables of 2 GB or more", "hdf5")
+            }
             FileFormat::Parquet => (cfg!(feature = "parquet"), "Parquet", "parquet"),
             _ => (true, "", ""),
         };
@@ -150,11 +155,9 @@ impl FileFormat {
         let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
         let of_scenes = schema.row == "scene";
         match self {
-            FileFormat::Npy | FileFormat::Csv | FileFormat::Parquet | FileFormat::Spd if shares => cannot(
-                "these",
-                "rows alone",
-                "repeat the shared arrays in each row, or name it .npz, .zarr or .h5",
-            ),
+            FileFormat::Npy | FileFormat::Csv | FileFormat::Parquet if shares => {
+                cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
+            }
             FileFormat::Npy if !one && of_scenes => {
                 let remedy = "choose one, or name it .npz, .zarr, .h5 or .parquet";
                 cannot(".npy", "one array", remedy)
@@ -163,9 +166,12 @@ impl FileFormat {
                 let remedy = "choose one quantity, or name it .npz, .zarr, .h5 or .parquet";
                 cannot(".npy", "one array", remedy)
             }
-            FileFormat::Spd if !(one && schema.fields[0].axis.as_deref() == Some("wavelength")) => {
-                let scene = "choose the spectra of one group";
+            FileFormat::Spd if !spd::holds(schema, spectra) => {
+                let scene = "choose the spectra of one group or more";
                 cannot(".spd", "spectra", if of_scenes { scene } else { "choose spectra alone" })
+            }
+            FileFormat::Mat if !mat::has_names(schema, spectra) => {
+                cannot(".mat", "names of up to 63 letters, digits and _, each once", "rename the group")
             }
             FileFormat::Mat if halves => cannot(".mat", "f32 and f64", "choose one of them"),
             FileFormat::Parquet if halves => cannot(".parquet", "f32 and f64", "choose one of them"),
@@ -182,7 +188,7 @@ impl ChunkFormat {
                 Err(OutputError::NotBuilt { path: path.to_owned(), what: "Zstandard", feature: "zstd" })
             }
             ChunkFormat::Zarr { .. } | ChunkFormat::Npy => Ok(()),
-            ChunkFormat::Parquet => FileFormat::Parquet.check(path, schema),
+            ChunkFormat::Parquet => FileFormat::Parquet.check(path, schema, &[]),
         }
     }
 }
@@ -203,16 +209,18 @@ pub struct FileWriter {
 }
 
 impl FileWriter {
-    /// Begins a file that will appear as `path`, in a format of single files.
+    /// Begins a file that will appear as `path`. The format is one of those of a single file; `spectra` are the arrays of
+    /// spectra in the schema.
     pub fn create(
         path: &Path,
         format: FileFormat,
         schema: &Schema,
+        spectra: &[SpectraArray],
         existing: IfExists,
     ) -> Result<FileWriter, OutputError> {
-        format.check(path, schema)?;
+        format.check(path, schema, spectra)?;
         let pending = PendingFile::create(path, existing)?;
-        let encoder = encoder(format, schema, &pending).map_err(|e| pending.failed(e))?;
+        let encoder = encoder(format, (schema, spectra), &pending).map_err(|e| pending.failed(e))?;
         Ok(FileWriter { encoder, pending })
     }
 
@@ -230,7 +238,11 @@ impl FileWriter {
     }
 }
 
-fn encoder(format: FileFormat, schema: &Schema, pending: &PendingFile) -> io::Result<Box<dyn Encoder>> {
+fn encoder(
+    format: FileFormat,
+    (schema, spectra): (&Schema, &[SpectraArray]),
+    pending: &PendingFile,
+) -> io::Result<Box<dyn Encoder>> {
     let file = pending.file().map_err(|e| match e {
         OutputError::Write { source, .. } => source,
         other => io::Error::other(other),
@@ -241,8 +253,9 @@ fn encoder(format: FileFormat, schema: &Schema, pending: &PendingFile) -> io::Re
         FileFormat::Csv => Box::new(csv::Csv::begin(BufWriter::new(file), schema)?),
         #[cfg(feature = "hdf5")]
         FileFormat::Hdf5 => Box::new(h5::Hdf5::begin(pending.temporary_path(), schema)?),
-        #[cfg(feature = "hdf5")]
-        FileFormat::Mat => Box::new(mat::Mat::begin(pending.temporary_path(), schema)?),
+        FileFormat::Mat => {
+            mat::begin(file, pending.temporary_path(), &mat::named(schema, spectra), mat::V5_BYTES)?
+        }
         #[cfg(feature = "parquet")]
         FileFormat::Parquet => Box::new(parquet::Parquet::begin(file, schema)?),
         _ => unreachable!("the others are no single files, or were refused by Format::check"),
@@ -288,13 +301,18 @@ mod tests {
             attributes: serde_json::Map::new(),
         };
         let error = |format: FileFormat, schema: &Schema| {
-            format.check(Path::new("x"), schema).err().map(|e| e.to_string()).unwrap_or_default()
+            let spectra = SpectraArray {
+                name: "spectra".to_owned(),
+                group: None,
+                kind: crate::dataset::SpectrumKind::Reflectance,
+                lrv: LrvLabel::None,
+            };
+            format.check(Path::new("x"), schema, &[spectra]).err().map(|e| e.to_string()).unwrap_or_default()
         };
         assert!(error(FileFormat::Npy, &schema(&[&spectra, &lrv])).contains("hold one array"));
         assert!(error(FileFormat::Spd, &schema(&[&lrv])).contains("hold spectra"));
         let halves = schema(&[&spectra.clone().stored_as(Dtype::F16)]);
         assert_eq!(error(FileFormat::Npy, &halves), "");
-        #[cfg(feature = "hdf5")]
         assert!(error(FileFormat::Mat, &halves).contains("f32 and f64"));
     }
 }

@@ -1,10 +1,10 @@
-//! Files that appear under their names only when they are complete.
+//! Files and folders that appear under their names only when they are complete.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempDir};
 
 use super::OutputError;
 
@@ -55,8 +55,7 @@ impl PendingFile {
         self.file.as_file().try_clone().map_err(|source| self.failed(source))
     }
 
-    /// Temporary name, for libraries that open files themselves.
-    #[cfg_attr(not(feature = "hdf5"), expect(dead_code))]
+    /// The temporary name, for libraries that open files themselves.
     pub(super) fn temporary_path(&self) -> &Path {
         self.file.path()
     }
@@ -78,6 +77,96 @@ impl PendingFile {
     /// Makes an error of writing, with the name that was being written.
     pub fn failed(&self, source: io::Error) -> OutputError {
         OutputError::Write { path: self.path.clone(), source }
+    }
+}
+
+/// A folder on its way to a name: a temporary one beside it until [`PendingFolder::finish`], and gone if that never
+/// comes.
+#[derive(Debug)]
+pub struct PendingFolder {
+    making: TempDir,
+    path: PathBuf,
+    existing: IfExists,
+    ours: FolderMark,
+}
+
+/// What tells folders that a program made from others, which it must not replace.
+#[derive(Clone, Copy, Debug)]
+pub struct FolderMark {
+    /// What such a folder is called, as in "a report".
+    pub name: &'static str,
+    /// Whether a folder is one.
+    pub is_ours: fn(&Path) -> bool,
+}
+
+impl PendingFolder {
+    /// Begins a folder that will appear as `path`. One that exists is replaced only if it has the mark.
+    pub fn create(path: &Path, existing: IfExists, ours: FolderMark) -> Result<PendingFolder, OutputError> {
+        let path = path.to_owned();
+        check_folder(&path, existing, ours)?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX);
+        #[cfg(unix)] // as any new folder; by default only its owner could read it
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+        match builder.tempdir_in(existing_folder(&path)?) {
+            Ok(making) => Ok(PendingFolder { making, path, existing, ours }),
+            Err(source) => Err(OutputError::Write { path, source }),
+        }
+    }
+
+    /// Where it is being made.
+    pub fn temporary_path(&self) -> &Path {
+        self.making.path()
+    }
+
+    /// Makes a folder in it.
+    pub fn add_folder(&self, name: &str) -> Result<(), OutputError> {
+        fs::create_dir(self.making.path().join(name)).map_err(|source| self.failed(source))
+    }
+
+    /// Writes a whole file in it, or in a folder in it.
+    pub fn write(&self, name: impl AsRef<Path>, bytes: &[u8]) -> Result<(), OutputError> {
+        fs::write(self.making.path().join(name), bytes).map_err(|source| self.failed(source))
+    }
+
+    /// Makes the folder appear under its name. What it replaces is out of the way only while it does.
+    pub fn finish(self) -> Result<(), OutputError> {
+        check_folder(&self.path, self.existing, self.ours)?; // it may have appeared meanwhile
+        sync_folder(self.making.path());
+        let parent = folder(&self.path);
+        let old = if self.path.exists() {
+            let old = tempfile::Builder::new().prefix(PREFIX).suffix(SUFFIX).tempdir_in(parent);
+            let old = old.map_err(|e| self.failed(e))?;
+            fs::rename(&self.path, old.path().join("old")).map_err(|e| self.failed(e))?;
+            Some(old)
+        } else {
+            None
+        };
+        if let Err(error) = fs::rename(self.making.path(), &self.path) {
+            if let Some(old) = old {
+                let _ = fs::rename(old.path().join("old"), &self.path);
+            }
+            return Err(self.failed(error));
+        }
+        sync_folder(parent);
+        let _ = self.making.keep(); // it is not there any more
+        Ok(())
+    }
+
+    fn failed(&self, source: io::Error) -> OutputError {
+        OutputError::Write { path: self.path.clone(), source }
+    }
+}
+
+/// Refuses a name that is taken, unless by an earlier folder of the kind that may be replaced.
+fn check_folder(path: &Path, existing: IfExists, ours: FolderMark) -> Result<(), OutputError> {
+    let path = path.to_owned();
+    match path.symlink_metadata() {
+        Err(_) => Ok(()),
+        Ok(found) if !found.is_dir() => Err(OutputError::NotAFolder { path }),
+        Ok(_) if existing == IfExists::Refuse => Err(OutputError::FolderExists { path }),
+        Ok(_) if !(ours.is_ours)(&path) => Err(OutputError::NotOurs { path, expected: ours.name }),
+        Ok(_) => Ok(()),
     }
 }
 
@@ -167,6 +256,48 @@ mod tests {
         assert!(matches!(write_file(&path, IfExists::Refuse, b"new"), Err(OutputError::Exists { .. })));
         write_file(&path, IfExists::Replace, b"new").unwrap();
         assert_eq!((fs::read(&path).unwrap(), files()), (b"new".to_vec(), 1));
+    }
+
+    #[test]
+    fn a_folder_replaces_only_one_of_its_kind() {
+        let beside = tempfile::tempdir().unwrap();
+        let path = beside.path().join("mine");
+        let ours = FolderMark { name: "a test", is_ours: |path| path.join("mark").is_file() };
+        let begin = |existing| PendingFolder::create(&path, existing, ours);
+        let make = |existing, text: &[u8]| {
+            let pending = begin(existing)?;
+            pending.add_folder("inner")?;
+            pending.write("inner/file", text)?;
+            pending.write("mark", b"")?;
+            pending.finish()
+        };
+        drop(begin(IfExists::Refuse).unwrap());
+        assert_eq!(fs::read_dir(beside.path()).unwrap().count(), 0);
+        make(IfExists::Refuse, b"one").unwrap();
+        assert!(matches!(make(IfExists::Refuse, b"two"), Err(OutputError::FolderExists { .. })));
+        make(IfExists::Replace, b"two").unwrap();
+        assert_eq!(fs::read(path.join("inner/file")).unwrap(), b"two");
+        fs::remove_file(path.join("mark")).unwrap();
+        let error = make(IfExists::Replace, b"three").unwrap_err().to_string();
+        assert!(error.contains("is not a test, so it is left alone"), "{error}");
+        assert_eq!(fs::read_dir(beside.path()).unwrap().count(), 1);
+        fs::remove_dir_all(&path).unwrap();
+        fs::write(&path, "a file").unwrap();
+        assert!(matches!(make(IfExists::Replace, b"four"), Err(OutputError::NotAFolder { .. })));
+    }
+
+    /// As any new folder is, and not for its owner alone.
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_heeds_the_umask() {
+        use std::os::unix::fs::PermissionsExt;
+        let beside = tempfile::tempdir().unwrap();
+        let ours = FolderMark { name: "a test", is_ours: |_| true };
+        let pending = PendingFolder::create(&beside.path().join("mine"), IfExists::Refuse, ours).unwrap();
+        pending.finish().unwrap();
+        fs::create_dir(beside.path().join("theirs")).unwrap();
+        let mode = |name| fs::metadata(beside.path().join(name)).unwrap().permissions().mode();
+        assert_eq!(mode("mine"), mode("theirs"));
     }
 
     #[test]

@@ -7,6 +7,7 @@ use half::f16;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::dataset::SpectrumKind;
 use crate::quantity::{Dtype, ValueRange};
 
 /// Decodes one value as f64, which holds values of every type exactly.
@@ -113,7 +114,6 @@ impl Field {
     }
 
     /// Whether a draw has a list of values, rather than one.
-    #[cfg(any(feature = "hdf5", feature = "parquet"))]
     pub(super) fn is_list(&self) -> bool {
         self.axis.is_some() || self.outer.is_some()
     }
@@ -187,7 +187,31 @@ impl SharedArray {
     }
 }
 
-/// Schema of a data set.
+/// An array of spectra in a data set, for formats whose names say what spectra are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpectraArray {
+    /// The name of the field or of the shared array.
+    pub name: String,
+    /// The group of a scene that they are of; `None` of draws.
+    pub group: Option<String>,
+    /// The kind of the spectra.
+    pub kind: SpectrumKind,
+    /// Their luminous reflectance.
+    pub lrv: LrvLabel,
+}
+
+/// The luminous reflectance that an array of spectra was scaled to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LrvLabel {
+    /// None.
+    None,
+    /// The same of all.
+    Same(f64),
+    /// One for each spectrum, in the field of this name.
+    Field(String),
+}
+
+/// What a data set holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Schema {
     /// Fields, in the order in which their columns are delivered.

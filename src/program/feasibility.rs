@@ -113,7 +113,7 @@ pub(crate) fn nearest_xyz(program: &Program, xyz: &Affine, target: [f64; 3]) -> 
     )
 }
 
-/// Half-spaces of a program's bounds.
+/// The bounds that a program's rule sets: those of the largest target, where each draw has its own.
 pub(crate) fn half_spaces(program: &Program) -> Vec<HalfSpace> {
     let gains = |band: usize| program.spectrum.gain.iter().map(move |gain| gain[band]);
     let mut half_spaces = Vec::new();
@@ -129,10 +129,11 @@ pub(crate) fn half_spaces(program: &Program) -> Vec<HalfSpace> {
         let (lrv_offset, lrv_gain) =
             (lrv_of(&program.spectrum.offset), program.spectrum.gain.iter().map(|g| lrv_of(g)));
         let lrv_gain: Vec<f64> = lrv_gain.collect();
+        let lrv = target.lrv.largest();
         for band in 0..program.bands() {
-            // target . s < LRV(s)
-            let coefficients = gains(band).zip(&lrv_gain).map(|(g, l)| target.lrv * g - l).collect();
-            push(band, coefficients, lrv_offset - target.lrv * program.spectrum.offset[band]);
+            // lrv . s < LRV(s)
+            let coefficients = gains(band).zip(&lrv_gain).map(|(g, l)| lrv * g - l).collect();
+            push(band, coefficients, lrv_offset - lrv * program.spectrum.offset[band]);
         }
     }
     half_spaces
@@ -158,11 +159,12 @@ mod tests {
     }
     use crate::colorimetry::lrv_weights;
     use crate::model::Model;
-    use crate::program::{self, LrvTarget};
+    use crate::program::{self, LrvLaw, LrvTarget};
 
     /// Reflectances of 3 bands that vary in one shape: 0.5 + 0.1 z, 0.5 + 0.2 z, 0.5 - 0.1 z.
     fn ramp(target: Option<(f64, Bounds)>) -> Program {
-        let target = target.map(|(lrv, bounds)| LrvTarget { lrv, weights: vec![0.25, 0.5, 0.25], bounds });
+        let weights = vec![0.25, 0.5, 0.25];
+        let target = target.map(|(lrv, bounds)| LrvTarget { lrv: LrvLaw::Fixed(lrv), weights, bounds });
         Program { target, ..varying(vec![0.5; 3], vec![0.1, 0.2, -0.1]) }
     }
 

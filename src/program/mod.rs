@@ -11,7 +11,7 @@ pub(crate) mod feasibility;
 mod rule;
 
 pub use rule::Bounds;
-pub(crate) use rule::{IntensityLaw, LrvTarget};
+pub(crate) use rule::{IntensityLaw, LrvLaw, LrvTarget};
 
 use crate::affine::Affine;
 use crate::cover::{BoxMixture, Cover};
@@ -39,6 +39,8 @@ pub(crate) enum Source {
     Map(Affine, Unit),
     /// The intensity of the draw.
     Intensity,
+    /// The draw's own target.
+    TargetLrv,
     /// The word of the draw's [`DrawStatus`](crate::DrawStatus).
     Status,
 }
@@ -135,7 +137,28 @@ impl Program {
         self.target.is_some() || self.intensity.is_some()
     }
 
-    /// Range of values that the spectra may take.
+    /// Whether each draw has a target of its own.
+    pub(crate) fn has_own_targets(&self) -> bool {
+        self.target.as_ref().is_some_and(|t| matches!(t.lrv, LrvLaw::Uniform { .. }))
+    }
+
+    /// Whether what is accepted depends on a draw's own target, so that no cover serves all draws.
+    pub(crate) fn tests_own_targets(&self) -> bool {
+        self.tests_scaled() && self.has_own_targets()
+    }
+
+    /// Whether a word of a draw's own, rather than of an attempt, has a part in it.
+    pub(crate) fn reads_draw_block(&self) -> bool {
+        self.intensity.is_some() || self.has_own_targets()
+    }
+
+    /// The same with every draw at the largest target.
+    pub(crate) fn at_largest_target(&self) -> Program {
+        let fixed = |target: LrvTarget| LrvTarget { lrv: LrvLaw::Fixed(target.lrv.largest()), ..target };
+        Program { target: self.target.clone().map(fixed), ..self.clone() }
+    }
+
+    /// What the values of spectra that come out are between.
     pub(crate) fn value_range(&self) -> ValueRange {
         match self.kind {
             SpectrumKind::Reflectance if !self.may_exceed_one() => ValueRange::Unit,

@@ -24,8 +24,7 @@ pub enum Bounds {
 /// A target luminous reflectance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LrvTarget {
-    /// The luminous reflectance (LRV) of every draw, in (0, 1): CIE Y of the 1931 2 degree observer under D65.
-    pub(crate) lrv: f64,
+    pub(crate) lrv: LrvLaw,
     /// The weights of the bands in a reflectance's LRV; they sum to 1. Draws are scaled by sums over their bands as
     /// they were rounded, so that it is the spectrum that comes out which has the target; a map of z would be off
     /// where a candidate is dark.
@@ -47,6 +46,29 @@ impl LrvTarget {
             }
         }
         self
+    }
+}
+
+/// The luminous reflectance value (LRV) that a draw is scaled to, in (0, 1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum LrvLaw<R = f64> {
+    /// The same for every draw.
+    Fixed(R),
+    /// A function of one uniform word u of the draw: low + span u, or `high` where rounding takes that above it.
+    Uniform { low: R, span: R, high: R },
+}
+
+impl LrvLaw {
+    pub(crate) fn uniform(low: f64, high: f64) -> LrvLaw {
+        LrvLaw::Uniform { low, span: high - low, high }
+    }
+
+    /// The largest target, which is the hardest to meet: a spectrum that is below 1 at one is below 1 at every lower.
+    pub(crate) fn largest(&self) -> f64 {
+        match *self {
+            LrvLaw::Fixed(lrv) => lrv,
+            LrvLaw::Uniform { high, .. } => high,
+        }
     }
 }
 

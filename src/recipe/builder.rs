@@ -1,9 +1,9 @@
 //! Construction of recipes, and the checks that they can be drawn.
 
 use super::outputs::{OutputRequest, outputs};
-use super::pilot::{TOLERABLE_FAILURE, failure, pilot};
+use super::pilot::{TOLERABLE_FAILURE, failure, pilot, pilot_of_draws};
 use super::{
-    CoverSize, DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, ProposalKind, Recipe, RecipeError,
+    CoverSize, DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, Lrv, ProposalKind, Recipe, RecipeError,
     RecipeSettings, XyzScale,
 };
 use crate::affine::Affine;
@@ -14,14 +14,14 @@ use crate::dataset::SpectrumKind;
 use crate::model::Model;
 use crate::program::condition::Condition;
 use crate::program::feasibility::{self, Room};
-use crate::program::{self, Bounds, IntensityLaw, LrvTarget, Program};
+use crate::program::{self, Bounds, IntensityLaw, LrvLaw, LrvTarget, Program};
 use crate::quantity::{Dtype, Layout, Quantity};
 
 /// A recipe under construction.
 #[derive(Clone, Debug)]
 pub struct RecipeBuilder {
     model: Model,
-    lrv: Option<f64>,
+    lrv: Option<Lrv>,
     xyz: Option<[f64; 3]>,
     bounds: Option<Bounds>,
     covariance_scale: f64,
@@ -68,7 +68,7 @@ impl RecipeBuilder {
         self
     }
 
-    /// Sets the illuminant under which reflectances have their XYZ and linear sRGB ([`Illuminant::D65`]).
+    /// The illuminant under which reflectances have their XYZ, chromaticity and linear sRGB ([`Illuminant::D65`]).
     pub fn illuminant(mut self, illuminant: Illuminant) -> Self {
         self.outputs.illuminant = Some(illuminant);
         self
@@ -85,10 +85,19 @@ impl RecipeBuilder {
         RecipeBuilder { intensity: Some(intensity), ..self }
     }
 
-    /// Scales every draw to a luminous reflectance (LRV, 0 to 1), eq. 9 and 10: CIE Y of the 1931 2 degree observer
-    /// under D65, perfect white = 1.
-    pub fn lrv(self, lrv: f64) -> Self {
-        RecipeBuilder { lrv: Some(lrv), ..self }
+    /// Scales every draw to a luminous reflectance value (LRV, 0 to 1), eq. 9 and 10: to one for all, or to one of its
+    /// own for each draw, uniform in a range.
+    ///
+    /// ```
+    /// use spectroll::{Model, Quantity, Recipe, Stream};
+    ///
+    /// let recipe = Recipe::builder(&Model::builtin("munsell-vrhel")?).lrv(0.2..0.6).quantities([Quantity::Lrv]).build()?;
+    /// let label = recipe.draw::<f32>(Stream::new(1), 0).values(Quantity::Lrv)[0];
+    /// assert!((0.2..=0.6).contains(&label));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn lrv(self, lrv: impl Into<Lrv>) -> Self {
+        RecipeBuilder { lrv: Some(lrv.into()), ..self }
     }
 
     /// Gives every draw these tristimulus values under D65, where a perfect white has Y = 1: draws of the model's
@@ -134,6 +143,9 @@ impl RecipeBuilder {
         let program = self.program()?;
         let half_spaces = feasibility::half_spaces(&program);
         let centre = self.centre(&program, &half_spaces)?;
+        if program.tests_own_targets() {
+            return self.reject_by_own_targets(program);
+        }
         let max_attempts = program.max_attempts;
         let recipe = self.propose(program, &half_spaces, centre)?;
         if failure(recipe.acceptance, max_attempts) > TOLERABLE_FAILURE {
@@ -192,9 +204,10 @@ impl RecipeBuilder {
     /// A point in the middle of the accepted region; `None` where that is for the pilot run to find out.
     fn centre(&self, program: &Program, half_spaces: &[HalfSpace]) -> Result<Option<Vec<f64>>, RecipeError> {
         if let Some(target) = &program.target {
+            let lrv = target.lrv.largest();
             let largest = feasibility::largest_lrv(program, &target.weights);
-            if let Some(largest) = largest.filter(|&largest| target.lrv >= largest) {
-                return Err(RecipeError::UnreachableLrv { lrv: target.lrv, largest });
+            if let Some(largest) = largest.filter(|&largest| lrv >= largest) {
+                return Err(RecipeError::UnreachableLrv { lrv, largest });
             }
         }
         match (feasibility::room(half_spaces), self.xyz) {
@@ -255,7 +268,30 @@ impl RecipeBuilder {
         })
     }
 
-    /// Effect of the given tristimulus values on this model.
+    /// The recipe of plain rejection where the target of each draw bounds its spectrum. A cover is of one region, and
+    /// each target has its own, so what plain rejection cannot draw at the hardest target is refused.
+    fn reject_by_own_targets(self, program: Program) -> Result<Recipe, RecipeError> {
+        let Some(Lrv::Uniform(low, high)) = self.lrv else {
+            unreachable!("the program has targets of draws")
+        };
+        if self.proposal == ProposalKind::Cover {
+            return Err(RecipeError::CoverOfLrvRange { low, high });
+        }
+        let (hardest, max_attempts) = (pilot(&program.at_largest_target()), program.max_attempts);
+        if failure(hardest, max_attempts) > TOLERABLE_FAILURE {
+            return Err(RecipeError::HopelessLrvRange { low, high, acceptance: hardest, max_attempts });
+        }
+        Ok(Recipe {
+            settings: self.settings(),
+            probability: pilot(&program),
+            acceptance: pilot_of_draws(&program, hardest),
+            model: self.model,
+            program,
+            cover: None,
+        })
+    }
+
+    /// What giving the tristimulus values does to this model.
     pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
         if self.model.kind() == SpectrumKind::Illuminant {
             return Err(RecipeError::XyzOfIlluminant);
@@ -318,11 +354,17 @@ impl RecipeBuilder {
         Ok(Program { intensity: Some(law), ..program })
     }
 
-    fn target(&self, lrv: f64) -> Result<LrvTarget, RecipeError> {
+    fn target(&self, lrv: Lrv) -> Result<LrvTarget, RecipeError> {
         // Far below, spectra would round to 0; just below 1, to 1.
-        if !(1e-30..1.0).contains(&f64::from(lrv as f32)) {
-            return Err(RecipeError::Lrv(lrv));
-        }
+        let check = |lrv: f64| match (1e-30..1.0).contains(&f64::from(lrv as f32)) {
+            true => Ok(lrv),
+            false => Err(RecipeError::Lrv(lrv)),
+        };
+        let lrv = match lrv {
+            Lrv::Fixed(lrv) => LrvLaw::Fixed(check(lrv)?),
+            Lrv::Uniform(low, high) if check(low)? < check(high)? => LrvLaw::uniform(low, high),
+            Lrv::Uniform(low, high) => return Err(RecipeError::LrvRange { low, high }),
+        };
         if self.model.kind() == SpectrumKind::Illuminant {
             return Err(RecipeError::LrvOfIlluminant);
         }

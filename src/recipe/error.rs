@@ -20,6 +20,19 @@ pub enum RecipeError {
     Invisible(Grid),
     #[error("no reflectance of this model has a luminous reflectance of {lrv}: the largest is {largest:.6}")]
     UnreachableLrv { lrv: f64, largest: f64 },
+    #[error("a target luminous reflectance between {low} and {high}: the first must be below the second")]
+    LrvRange { low: f64, high: f64 },
+    #[error(
+        "too few candidates would be accepted at the upper end of target luminous reflectances between {low} and \
+         {high}: {}",
+        hopeless(*acceptance, *max_attempts, "lower that end, or ask for one target, for which covers can propose")
+    )]
+    HopelessLrvRange { low: f64, high: f64, acceptance: f64, max_attempts: u32 },
+    #[error(
+        "no cover serves every target luminous reflectance between {low} and {high}, each of which bounds the spectrum \
+         in its own way: let plain rejection propose, bound only the spectrum before scaling, or ask for one target"
+    )]
+    CoverOfLrvRange { low: f64, high: f64 },
     #[error("tristimulus values of {0:?}: they must be finite, and Y above 0 and below 1")]
     Xyz([f64; 3]),
     #[error("target tristimulus values belong to reflectances, and this model is of illuminants")]
@@ -73,18 +86,22 @@ pub enum RecipeError {
     NoCover { components: usize },
     #[error("{setting} would change nothing without {needs}: leave it out, or ask for that")]
     Pointless { setting: &'static str, needs: &'static str },
-    #[error("too few candidates would be accepted: {}", hopeless(*acceptance, *max_attempts))]
+    #[error(
+        "too few candidates would be accepted: {}",
+        hopeless(*acceptance, *max_attempts, "ask for less extreme spectra")
+    )]
     Hopeless { acceptance: f64, max_attempts: u32 },
 }
 
-fn hopeless(acceptance: f64, max_attempts: u32) -> String {
+/// The share of candidates that would be accepted, and what helps besides more attempts.
+fn hopeless(acceptance: f64, max_attempts: u32, remedy: &str) -> String {
     if acceptance == 0.0 {
-        return format!("none of {PILOT} was; ask for less extreme spectra");
+        return format!("none of {PILOT} was; {remedy}");
     }
     let needed = (TOLERABLE_FAILURE.ln() / (-acceptance).ln_1p()).ceil();
     format!(
         "an estimated {acceptance:.1e} of them, so that one draw in {:.1e} would fail in all its {max_attempts} attempts; \
-         allow at least {needed:.0} attempts, or ask for less extreme spectra",
+         allow at least {needed:.0} attempts, or {remedy}",
         1.0 / failure(acceptance, max_attempts)
     )
 }

@@ -13,6 +13,8 @@ pub use error::RecipeError;
 pub use scalar::{Draw, ScalarSampler};
 pub use settings::RecipeSettings;
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use crate::colorimetry;
@@ -63,7 +65,39 @@ pub enum ProposalKind {
     Cover,
 }
 
-/// Factor of an illuminant.
+/// The luminous reflectance value (LRV) that reflectances are scaled to: CIE Y of the 1931 2 degree observer under D65,
+/// 1 for a perfect white.
+///
+/// ```
+/// use spectroll::Lrv;
+///
+/// assert_eq!(Lrv::from(0.4), Lrv::Fixed(0.4));
+/// assert_eq!(Lrv::from(0.2..0.6), Lrv::Uniform(0.2, 0.6));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "settings::LrvRecord", into = "settings::LrvRecord")]
+pub enum Lrv {
+    /// The same for every draw.
+    Fixed(f64),
+    /// One of its own for each draw, uniform between the two. It belongs to the draw and not to a candidate: where the
+    /// scaled spectrum is bounded, a light target takes more candidates, and is as frequent as a dark one.
+    /// [`Quantity::Lrv`](crate::Quantity::Lrv) has it. The first must be below the second; in f32, either may come out.
+    Uniform(f64, f64),
+}
+
+impl From<f64> for Lrv {
+    fn from(lrv: f64) -> Lrv {
+        Lrv::Fixed(lrv)
+    }
+}
+
+impl From<Range<f64>> for Lrv {
+    fn from(range: Range<f64>) -> Lrv {
+        Lrv::Uniform(range.start, range.end)
+    }
+}
+
+/// What an illuminant is multiplied by.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intensity {
@@ -76,7 +110,7 @@ pub enum Intensity {
     Data,
 }
 
-/// Illuminant of the XYZ and linear sRGB of reflectances.
+/// The illuminant that reflectances have their XYZ, chromaticity and linear sRGB under.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Illuminant {
@@ -136,7 +170,8 @@ impl Recipe {
         &self.settings
     }
 
-    /// The share of candidates that are accepted, estimated from 65,536 of them.
+    /// The share of candidates that are accepted, estimated from 65,536 of them, or from about as many in whole draws
+    /// where what is accepted depends on a target of the draw's own.
     pub fn acceptance(&self) -> f64 {
         self.acceptance
     }
@@ -186,7 +221,8 @@ impl Recipe {
     ///   `PREFIX_draw_in(stream, seed, index)` draws from a [`Stream`], given its number.
     /// - for spectra, `PREFIX_at(draw, band) -> f32` and `PREFIX_spectrum(draw) -> array<f32, bands>`;
     /// - for weights, `PREFIX_weights(draw) -> array<f32, components>`;
-    /// - for XYZ and sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_srgb`;
+    /// - for XYZ and linear sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_linear_srgb`;
+    /// - for chromaticity, `PREFIX_chromaticity(draw) -> vec2<f32>`;
     /// - for LRV and intensity, `PREFIX_lrv(draw) -> f32` and `PREFIX_intensity`.
     ///
     /// The module needs no optional feature. To import it with `naga_oil`, put a line `#define_import_path NAME` before
@@ -196,7 +232,7 @@ impl Recipe {
     /// use spectroll::{Model, Quantity, Recipe};
     ///
     /// let recipe = Recipe::builder(&Model::builtin("granada")?).quantities([Quantity::LinearSrgb]).build()?;
-    /// assert!(recipe.wgsl("lamp")?.contains("fn lamp_srgb(d: lamp_Draw) -> vec3<f32>"));
+    /// assert!(recipe.wgsl("lamp")?.contains("fn lamp_linear_srgb(d: lamp_Draw) -> vec3<f32>"));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn wgsl(&self, prefix: &str) -> Result<String, WgslError> {
@@ -226,6 +262,25 @@ mod tests {
             (surface.clone().lrv(f64::NAN), "NaN: it must be above 0 and below 1"),
             (surface.clone().lrv(0.0), "reflectance of 0:"),
             (surface.clone().lrv(0.996), "the largest is 0.995928"),
+            (surface.clone().lrv(0.6..0.2), "between 0.6 and 0.2: the first must be below the second"),
+            (surface.clone().lrv(0.4..0.4), "between 0.4 and 0.4: the first must be below the second"),
+            (surface.clone().lrv(0.4..f64::NAN), "NaN: it must be above 0 and below 1"),
+            (surface.clone().lrv(0.0..0.4), "reflectance of 0:"),
+            (surface.clone().lrv(0.2..1.5), "reflectance of 1.5:"),
+            (surface.clone().lrv(0.2..0.996), "the largest is 0.995928"),
+            (
+                surface.clone().lrv(0.2..0.995).bounds(Bounds::Scaled),
+                "upper end of target luminous reflectances between 0.2 and 0.995: none of 65536 was; lower that end",
+            ),
+            (
+                surface.clone().lrv(0.2..0.95).bounds(Bounds::Both).max_attempts(100),
+                "attempts, or lower that end",
+            ),
+            (
+                surface.clone().lrv(0.2..0.6).bounds(Bounds::Both).proposal(ProposalKind::Cover),
+                "no cover serves every target luminous reflectance between 0.2 and 0.6",
+            ),
+            (light.clone().lrv(0.2..0.5), "of illuminants"),
             (surface.clone().covariance_scale(f64::NAN), "finite and not negative"),
             (surface.clone().max_attempts(0), "at least 1 attempt"),
             (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
@@ -238,7 +293,10 @@ mod tests {
             (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
             (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
             (surface.clone().bounds(Bounds::Both), "without a target luminous reflectance"),
-            (surface.clone().illuminant(Illuminant::E), "without XYZ or linear sRGB of reflectances"),
+            (
+                surface.clone().illuminant(Illuminant::E),
+                "without XYZ, chromaticity or linear sRGB of reflectances",
+            ),
             (surface.clone().xyz_scale(XyzScale::UnitY).quantities([Quantity::Xyz]), "of illuminants"),
         ] {
             let text = message(recipe);
@@ -289,4 +347,15 @@ mod tests {
     }
 
     const FIRST: [u32; 3] = [1050670988, 1051942847, 1058168784];
+
+    #[test]
+    fn the_first_draw_with_a_target_of_its_own_stays_what_it_is() {
+        let recipe = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap()).lrv(0.2..0.6);
+        let recipe = recipe.bounds(Bounds::Scaled).quantities([Quantity::Spectra, Quantity::Lrv]).build();
+        let drawn = recipe.unwrap().draw::<f32>(Stream::new(1), 0);
+        let (spectrum, lrv) = (drawn.spectrum(), drawn.values(Quantity::Lrv)[0]);
+        assert_eq!([lrv, spectrum[0], spectrum[30]].map(f32::to_bits), FIRST_OF_ITS_OWN);
+    }
+
+    const FIRST_OF_ITS_OWN: [u32; 3] = [1058549709, 1057498696, 1064905033];
 }

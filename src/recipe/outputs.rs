@@ -5,7 +5,7 @@ use crate::affine::Affine;
 use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::model::Model;
-use crate::program::{Output, Program, Source, Unit};
+use crate::program::{LrvLaw, Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity};
 
 /// Quantities that a recipe asks for, and their settings.
@@ -48,12 +48,15 @@ pub(crate) fn outputs(
     if quantities.is_empty() {
         return Err(RecipeError::Nothing);
     }
-    let has_colours = quantities.iter().any(|q| matches!(q, Quantity::Xyz | Quantity::LinearSrgb));
+    let has_colours = quantities.iter().any(|quantity| Quantity::COLOURS.contains(quantity));
+    // A chromaticity is the same in every scale.
+    let has_scaled = quantities.iter().any(|q| matches!(q, Quantity::Xyz | Quantity::LinearSrgb));
     if asked.illuminant.is_some() && !(has_colours && model.kind() == SpectrumKind::Reflectance) {
-        let (setting, needs) = ("an illuminant to see surfaces under", "XYZ or linear sRGB of reflectances");
+        let (setting, needs) =
+            ("an illuminant to see surfaces under", "XYZ, chromaticity or linear sRGB of reflectances");
         return Err(RecipeError::Pointless { setting, needs });
     }
-    if asked.xyz_scale.is_some() && !(has_colours && model.kind() == SpectrumKind::Illuminant) {
+    if asked.xyz_scale.is_some() && !(has_scaled && model.kind() == SpectrumKind::Illuminant) {
         let (setting, needs) = ("a scale of tristimulus values", "XYZ or linear sRGB of illuminants");
         return Err(RecipeError::Pointless { setting, needs });
     }
@@ -62,7 +65,7 @@ pub(crate) fn outputs(
         let width = match &source {
             Source::Spectrum => program.bands(),
             Source::Map(map, _) => map.offset.len(),
-            Source::Intensity | Source::Status => 1,
+            Source::Intensity | Source::TargetLrv | Source::Status => 1,
         };
         let dtype = match quantity {
             Quantity::Spectra => asked.spectra,
@@ -100,11 +103,21 @@ fn source(
             let map = if quantity == Quantity::Xyz { xyz } else { xyz.project(&colorimetry::XYZ_TO_SRGB) };
             Source::Map(map, unit)
         }
+        Quantity::Chromaticity => {
+            let grid = model.grid();
+            colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+            let xyz = program.spectrum.project(&xyz_weights(asked, model)?);
+            let sum = xyz.project(&[[1.0; 3]]);
+            Source::Map(xyz.project(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), Unit::Over(sum))
+        }
         Quantity::Lrv => match (&program.target, model.kind()) {
             (_, SpectrumKind::Illuminant) => {
                 return Err(unless("illuminants have no luminous reflectance"));
             }
-            (Some(target), _) => Source::Map(Affine::constant(target.lrv, k), Unit::One),
+            (Some(target), _) => match target.lrv {
+                LrvLaw::Fixed(lrv) => Source::Map(Affine::constant(lrv, k), Unit::One),
+                LrvLaw::Uniform { .. } => Source::TargetLrv,
+            },
             (None, _) => {
                 let grid = model.grid();
                 let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;

@@ -9,6 +9,9 @@ use crate::random::stream::Stream;
 /// Number of candidates of a pilot run.
 pub(super) const PILOT: u64 = 1 << 16;
 
+/// How many whole draws estimate it at least: enough for 1 part in 10, at some 10^6 candidates in the worst case.
+const LEAST_DRAWS: u64 = 256;
+
 /// The probability that a draw finds no candidate within its attempts, above which a recipe is refused: one failure
 /// in a data set of 10^12 draws.
 pub(super) const TOLERABLE_FAILURE: f64 = 1e-12;
@@ -20,6 +23,20 @@ pub(super) fn pilot(program: &Program) -> f64 {
     let stream = Stream::named(0, "pilot");
     let accepted = (0..PILOT).into_par_iter().filter(|&index| kernel.accepts(|b| stream.block(index, 0, b)));
     accepted.count() as f64 / PILOT as f64
+}
+
+/// The share of accepted candidates among those of whole draws, each of which goes on until one meets its own target: a
+/// hard target counts by all the candidates that it takes. `least` is the acceptance at the hardest, which keeps the
+/// candidates to about [`PILOT`].
+pub(super) fn pilot_of_draws(program: &Program, least: f64) -> f64 {
+    let kernel = Kernel::<f32>::new(program);
+    let stream = Stream::named(0, "pilot");
+    let draws = ((PILOT as f64 * least) as u64).max(LEAST_DRAWS);
+    let candidates = (0..draws).into_par_iter().map(|index| match kernel.draw(stream, index).1.attempts() {
+        0 => u64::from(program.max_attempts),
+        attempts => u64::from(attempts),
+    });
+    draws as f64 / candidates.sum::<u64>() as f64
 }
 
 /// The probability that none of `attempts` candidates is accepted.

@@ -8,7 +8,7 @@ use crate::cpu::Kernel;
 use crate::draw_status::DrawStatus;
 use crate::quantity::Quantity;
 use crate::random::real::Real;
-use crate::random::stream::Stream;
+use crate::random::stream::{DRAW_BLOCK, Stream};
 
 /// Draws of a recipe, one at a time: in f32 as every engine makes them, in f64 without their rounding errors. See
 /// [`Recipe::scalar_sampler`](crate::Recipe::scalar_sampler).
@@ -49,10 +49,17 @@ impl<R: Real> ScalarSampler<R> {
 
 impl<R: Real> Distribution<Draw<R>> for ScalarSampler<R> {
     fn sample<G: Rng + ?Sized>(&self, rng: &mut G) -> Draw<R> {
+        let mut words = || [(); 4].map(|()| rng.next_u32());
+        // What belongs to the draw is the same in all attempts: were its target drawn anew with each candidate, hard
+        // targets would be rarer than easy ones.
+        let mut own = None;
+        let mut block = |number| match number {
+            DRAW_BLOCK => *own.get_or_insert_with(&mut words),
+            _ => words(),
+        };
         // A recipe that could go on here for long could not be built.
         let mut attempts = 1..=u32::MAX;
-        let drawn =
-            attempts.find_map(|attempt| self.kernel.candidate(attempt, |_| [(); 4].map(|()| rng.next_u32())));
+        let drawn = attempts.find_map(|attempt| self.kernel.candidate(attempt, &mut block));
         self.drawn(drawn.expect("a candidate is accepted"))
     }
 }

@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, ProposalKind, Recipe, RecipeBuilder, XyzScale};
+use super::{
+    DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder, XyzScale,
+};
 use crate::model::Model;
 use crate::program::Bounds;
 use crate::quantity::Quantity;
@@ -12,8 +14,8 @@ use crate::quantity::Quantity;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecipeSettings {
-    /// Target luminous reflectance (LRV).
-    pub lrv: Option<f64>,
+    /// The target luminous reflectance value (LRV).
+    pub lrv: Option<Lrv>,
     /// The target tristimulus values under D65.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub xyz: Option<[f64; 3]>,
@@ -26,7 +28,7 @@ pub struct RecipeSettings {
     pub intensity: Option<Intensity>,
     /// The quantities of each draw.
     pub quantities: Vec<Quantity>,
-    /// The illuminant of reflectances' XYZ and linear sRGB.
+    /// The illuminant of reflectances' XYZ, chromaticity and linear sRGB.
     pub illuminant: Illuminant,
     /// The scale of illuminants' XYZ and linear sRGB.
     pub xyz_scale: XyzScale,
@@ -85,6 +87,32 @@ impl RecipeSettings {
     }
 }
 
+/// A target LRV as it is written: a number, or `{"uniform": [low, high]}`.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged, deny_unknown_fields)]
+pub(super) enum LrvRecord {
+    Fixed(f64),
+    Uniform { uniform: (f64, f64) },
+}
+
+impl From<LrvRecord> for Lrv {
+    fn from(record: LrvRecord) -> Lrv {
+        match record {
+            LrvRecord::Fixed(lrv) => Lrv::Fixed(lrv),
+            LrvRecord::Uniform { uniform: (low, high) } => Lrv::Uniform(low, high),
+        }
+    }
+}
+
+impl From<Lrv> for LrvRecord {
+    fn from(lrv: Lrv) -> LrvRecord {
+        match lrv {
+            Lrv::Fixed(lrv) => LrvRecord::Fixed(lrv),
+            Lrv::Uniform(low, high) => LrvRecord::Uniform { uniform: (low, high) },
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,7 +126,7 @@ mod tests {
             r#"{"lrv":null,"bounds":"base","cov_scale":1.0,"intensity":null,"quantities":["spectra"],"illuminant":"d65","xyz_scale":"absolute","proposal":"auto","max_attempts":65536}"#
         );
         let other = RecipeSettings {
-            lrv: Some(0.4),
+            lrv: Some(Lrv::Fixed(0.4)),
             xyz: Some([0.1, 0.2, 0.3]),
             bounds: Bounds::Both,
             intensity: Some(Intensity::LogUniform(0.15, 150.0)),
@@ -110,6 +138,7 @@ mod tests {
         };
         let text = serde_json::to_string(&other).unwrap();
         for name in [
+            "\"lrv\":0.4,",
             "\"both\"",
             "{\"loguniform\":[0.15,150.0]}",
             "linear_srgb",
@@ -119,6 +148,10 @@ mod tests {
             assert!(text.contains(name), "{name} in {text}");
         }
         assert_eq!(serde_json::from_str::<RecipeSettings>(&text).unwrap(), other);
+        let ranged = RecipeSettings { lrv: Some(Lrv::Uniform(0.2, 0.6)), ..RecipeSettings::default() };
+        let text = serde_json::to_string(&ranged).unwrap();
+        assert_eq!(text, plain.replace("null,\"bounds", "{\"uniform\":[0.2,0.6]},\"bounds"));
+        assert_eq!(serde_json::from_str::<RecipeSettings>(&text).unwrap(), ranged);
         let simple = |intensity| serde_json::to_string(&intensity).unwrap();
         assert_eq!(simple(Intensity::Data) + &simple(Intensity::Fixed(2.0)), r#""data"{"fixed":2.0}"#);
     }

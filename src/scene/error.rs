@@ -5,9 +5,12 @@ use std::fmt;
 use crate::dataset::{DatasetError, SpectrumKind};
 use crate::grid::{Grid, GridError};
 use crate::model::ModelError;
+use crate::quantity::Quantity;
 use crate::recipe::RecipeError;
 
-/// Error returned where a scene cannot be drawn.
+use super::group::QUANTITIES;
+
+/// Why a scene is none.
 #[derive(Debug, thiserror::Error)]
 #[error("{place}: {problem}")]
 pub struct SceneError {
@@ -97,6 +100,10 @@ pub enum SceneErrorKind {
         "copies are scaled to levels, and there are none: write lrv as a list or as {{ from, to, levels }}"
     )]
     NoLevels,
+    #[error("there is none: name one at least, of {}", quantities())]
+    NoQuantities,
+    #[error("a group has no {quantity} to give; there are {}", quantities())]
+    NotOfGroups { quantity: Quantity },
     #[error("hue {hue}, saturation {saturation}, lightness {lightness}: {source}; narrow the ranges")]
     Hue { hue: f64, saturation: f64, lightness: f64, source: RecipeError },
     #[error("{0}")]
@@ -171,6 +178,10 @@ fn meant(suggestion: &Option<String>) -> String {
 
 fn builtin() -> String {
     crate::model::Model::BUILTIN.join(", ")
+}
+
+fn quantities() -> String {
+    QUANTITIES.map(Quantity::name).join(", ")
 }
 
 fn same_grid(model: Grid) -> String {

@@ -12,11 +12,13 @@ use crate::dataset::{Dataset, DatasetError, Table};
 use crate::grid::Extrapolation;
 use crate::model::Model;
 use crate::program::Bounds;
+use crate::quantity::Quantity;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
 
 use super::error::{SceneError, SceneErrorKind, SceneErrorPlace};
 use super::group::{
-    Base, Copies, Group, Hue, Illuminants, IntensityScope, LrvLevels, Surfaces, TargetConstraint, Targets,
+    Base, Copies, Group, Hue, Illuminants, IntensityScope, LrvLevels, QUANTITIES, Surfaces, TargetConstraint,
+    Targets,
 };
 use super::reader::{Entry, Section, Wrong};
 use super::{Scene, SceneBuilder};
@@ -30,11 +32,33 @@ pub const PRESETS: [(&str, &str); 3] = [
 ];
 
 const SCENE: [&str; 6] = ["scenes", "seed", "wavelengths", "illuminant", "surface", "target"];
-const ILLUMINANT: [&str; 9] =
-    ["name", "model", "count", "intensity", "mean", "cov_scale", "same_shape", "fixed", "max_attempts"];
-const SURFACE: [&str; 6] = ["name", "model", "count", "cov_scale", "fixed", "max_attempts"];
-const TARGET: [&str; 11] =
-    ["name", "model", "count", "lrv", "xyz", "hue", "flat", "bounds", "copies", "cov_scale", "max_attempts"];
+const ILLUMINANT: [&str; 10] = [
+    "name",
+    "model",
+    "count",
+    "intensity",
+    "mean",
+    "cov_scale",
+    "same_shape",
+    "fixed",
+    "max_attempts",
+    "quantities",
+];
+const SURFACE: [&str; 7] = ["name", "model", "count", "cov_scale", "fixed", "max_attempts", "quantities"];
+const TARGET: [&str; 12] = [
+    "name",
+    "model",
+    "count",
+    "lrv",
+    "xyz",
+    "hue",
+    "flat",
+    "bounds",
+    "copies",
+    "cov_scale",
+    "max_attempts",
+    "quantities",
+];
 
 impl Scene {
     /// Reads a scene file. Models and spectra that it names are sought in its folder.
@@ -59,6 +83,15 @@ impl Scene {
     /// assert!(error.starts_with(r#"wall.toml, line 5, cuont of "wall": there is no such key, did you mean "count"?"#));
     /// ```
     pub fn parse(name: &str, text: &str, folder: &Path) -> Result<Scene, SceneError> {
+        Scene::read(name, text, folder, None)
+    }
+
+    /// Reads the text of a scene file, whose scenes are to be drawn with another seed than it says.
+    pub fn parse_seeded(name: &str, text: &str, folder: &Path, seed: u64) -> Result<Scene, SceneError> {
+        Scene::read(name, text, folder, Some(seed))
+    }
+
+    fn read(name: &str, text: &str, folder: &Path, seed: Option<u64>) -> Result<Scene, SceneError> {
         let error = |span: Option<Range<usize>>, group: Option<String>, key: String, problem| {
             let line = span.map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
             SceneError::new(SceneErrorPlace { file: Some(name.to_owned()), line, group, key }, problem)
@@ -66,9 +99,10 @@ impl Scene {
         let table = DeTable::parse(text).map_err(|e| {
             error(e.span(), None, String::new(), SceneErrorKind::Syntax(e.message().replace('\n', "; ")))
         })?;
-        let file = Reader { folder, models: HashMap::new() }
+        let mut file = Reader { folder, models: HashMap::new() }
             .scene(table.get_ref())
             .map_err(|wrong| error(Some(wrong.span), wrong.group, wrong.key, *wrong.problem))?;
+        file.builder.seed = seed.unwrap_or(file.builder.seed);
         file.builder.checked().map_err(|fault| {
             let spans = fault.group.map_or(&file.spans, |group| &file.groups[group].spans);
             let own = spans.iter().find(|(key, _)| *key == fault.key).map(|(_, span)| span.clone());
@@ -211,7 +245,14 @@ impl Reader<'_> {
             None => DEFAULT_MAX_ATTEMPTS,
             Some(entry) => u32::try_from(entry.whole()?).unwrap_or(u32::MAX), // which is refused
         };
-        Ok(Base { name: name.to_owned(), model, count, covariance_scale, max_attempts })
+        let quantities = match section.get("quantities") {
+            None => vec![Quantity::Spectra],
+            Some(entry) => entry.choices(
+                &QUANTITIES.map(|quantity| (quantity.name(), quantity)),
+                "a list, as in [\"spectra\", \"xyz\"]",
+            )?,
+        };
+        Ok(Base { name: name.to_owned(), model, count, covariance_scale, max_attempts, quantities })
     }
 
     fn model(&mut self, entry: &Entry) -> Result<Model, Wrong> {

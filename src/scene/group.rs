@@ -2,6 +2,7 @@
 
 use crate::model::Model;
 use crate::program::Bounds;
+use crate::quantity::Quantity;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
 
 /// Settings that groups of all kinds have.
@@ -13,9 +14,14 @@ pub(super) struct Base {
     pub(super) count: u64,
     pub(super) covariance_scale: f64,
     pub(super) max_attempts: u32,
+    pub(super) quantities: Vec<Quantity>,
 }
 
-/// Group of lights, with their number in each scene.
+/// The quantities that a group can be asked for.
+pub(super) const QUANTITIES: [Quantity; 4] =
+    [Quantity::Spectra, Quantity::Xyz, Quantity::Chromaticity, Quantity::LinearSrgb];
+
+/// Lights, so many in each scene.
 #[derive(Clone, Debug)]
 pub struct Illuminants {
     pub(super) base: Base,
@@ -154,6 +160,15 @@ macro_rules! base {
                 self.base.max_attempts = max_attempts;
                 self
             }
+
+            /// The quantities to give an array each, of spectra, XYZ, chromaticity and linear sRGB
+            /// ([`Quantity::Spectra`]): of reflectances under D65, where a perfect white has Y = 1; of illuminants
+            /// their own ([`XyzScale::Absolute`](crate::XyzScale::Absolute)), intensity included. What else describes
+            /// a group, such as its intensities, always comes along.
+            pub fn quantities(mut self, quantities: impl IntoIterator<Item = Quantity>) -> Self {
+                self.base.quantities = quantities.into_iter().collect();
+                self
+            }
         }
 
         impl From<$group> for Group {
@@ -252,7 +267,12 @@ impl Base {
             count,
             covariance_scale: 1.0,
             max_attempts: DEFAULT_MAX_ATTEMPTS,
+            quantities: vec![Quantity::Spectra],
         }
+    }
+
+    pub(super) fn wants(&self, quantity: Quantity) -> bool {
+        self.quantities.contains(&quantity)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::grid::Grid;
 use crate::model::{Model, ModelParts};
@@ -11,7 +12,7 @@ use crate::random::stream::{self, Stream};
 use crate::recipe::{Intensity, Recipe, RecipeBuilder, RecipeError};
 
 use super::error::{Fault, SceneErrorKind};
-use super::group::{Base, Group, Illuminants, IntensityScope, TargetConstraint, Targets};
+use super::group::{Base, Group, Illuminants, IntensityScope, QUANTITIES, TargetConstraint, Targets};
 use super::target::{TargetPlan, key};
 
 /// A group as it is drawn.
@@ -27,6 +28,8 @@ pub(super) struct GroupPlan {
     pub(super) max_attempts: u32,
     pub(super) shapes: Shapes,
     pub(super) intensity: Option<Varying>,
+    /// For targets that are asked for what it sees; all others have it from their recipe.
+    pub(super) observer: Option<Observer>,
     pub(super) arrays: Vec<Array>,
 }
 
@@ -50,6 +53,25 @@ pub(super) enum Shapes {
     Once(Box<Drawing>),
     /// From the CPU, for each scene.
     Target(Box<TargetPlan>),
+}
+
+/// The weights of the bands in X, Y and Z under D65.
+pub(super) struct Observer([Vec<f64>; 3]);
+
+impl Observer {
+    /// A quantity that tristimulus values give, of a reflectance: summed in f64, since targets are drawn on the CPU
+    /// whatever the engine.
+    pub(super) fn see(&self, spectrum: &[f32], quantity: Quantity) -> Vec<f32> {
+        let dot = |w: &Vec<f64>| w.iter().zip(spectrum).map(|(w, &s)| w * f64::from(s)).sum::<f64>();
+        let xyz = self.0.each_ref().map(dot);
+        let [x, y, z] = xyz;
+        match quantity {
+            Quantity::Xyz => xyz.map(|v| v as f32).to_vec(),
+            Quantity::LinearSrgb => colorimetry::linear_srgb(xyz).map(|v| v as f32).to_vec(),
+            Quantity::Chromaticity => [x, y].map(|v| (v / (x + y + z)) as f32).to_vec(),
+            other => unreachable!("{other} is not of tristimulus values"),
+        }
+    }
 }
 
 /// Draws of a recipe: `places` a scene, one for each of its elements or one for all.
@@ -136,6 +158,13 @@ impl GroupPlan {
         {
             return Err(fault("model", SceneErrorKind::Grid { model: model.grid(), scene: grid }));
         }
+        if base.quantities.is_empty() {
+            return Err(fault("quantities", SceneErrorKind::NoQuantities));
+        }
+        if let Some(other) = base.quantities.iter().find(|quantity| !QUANTITIES.contains(quantity)) {
+            return Err(fault("quantities", SceneErrorKind::NotOfGroups { quantity: *other }));
+        }
+        let mut observer = None;
         let (kind, shapes, intensity) = match group {
             Group::Illuminants(group) => {
                 let (drawing, intensity) = illuminants(group).map_err(|(k, p)| fault(k, p))?;
@@ -144,14 +173,19 @@ impl GroupPlan {
             }
             Group::Surfaces(group) => {
                 let model = of_kind(base, SpectrumKind::Reflectance).map_err(|(k, p)| fault(k, p))?;
-                let recipe =
-                    recipe(base, model).build().map_err(|e| fault(key(&e), SceneErrorKind::Recipe(e)))?;
+                let recipe = recipe(base, model, group.fixed);
+                let recipe = recipe.build().map_err(|e| fault(key(&e), SceneErrorKind::Recipe(e)))?;
                 let drawing = Box::new(Drawing { recipe, places: count });
                 let shapes = if group.fixed { Shapes::Once(drawing) } else { Shapes::Engine(drawing) };
                 (GroupKind::Surface, shapes, None)
             }
             Group::Targets(group) => {
                 let target = TargetPlan::new(group, grid.len(), stream).map_err(|(k, p)| fault(k, p))?;
+                if base.quantities.iter().any(|quantity| Quantity::COLOURS.contains(quantity)) {
+                    let invisible = || SceneErrorKind::Recipe(RecipeError::Invisible(grid));
+                    let weights = colorimetry::xyz_weights(grid);
+                    observer = Some(Observer(weights.ok_or_else(|| fault("wavelengths", invisible()))?));
+                }
                 (GroupKind::Target, Shapes::Target(Box::new(target)), None)
             }
         };
@@ -161,7 +195,12 @@ impl GroupPlan {
             Shapes::Target(_) => base.model.clone(),
         };
         let (name, max_attempts) = (base.name.clone(), base.max_attempts);
-        Ok(GroupPlan { name, kind, model, count, stream, max_attempts, shapes, intensity, arrays })
+        Ok(GroupPlan { name, kind, model, count, stream, max_attempts, shapes, intensity, observer, arrays })
+    }
+
+    /// Whether it has an array of a quantity.
+    pub(super) fn gives(&self, quantity: Quantity) -> bool {
+        self.arrays.iter().any(|array| array.quantity == quantity)
     }
 
     /// Spectra that the engine draws, if it draws any.
@@ -173,8 +212,13 @@ impl GroupPlan {
     }
 }
 
-fn recipe(base: &Base, model: &Model) -> RecipeBuilder {
-    Recipe::builder(model).covariance_scale(base.covariance_scale).max_attempts(base.max_attempts)
+/// The recipe of what the group gives. What is drawn once has its spectra all the same: a renderer takes them.
+fn recipe(base: &Base, model: &Model, once: bool) -> RecipeBuilder {
+    let spectra = once.then_some(Quantity::Spectra);
+    Recipe::builder(model)
+        .covariance_scale(base.covariance_scale)
+        .max_attempts(base.max_attempts)
+        .quantities(base.quantities.iter().copied().chain(spectra))
 }
 
 fn of_kind(base: &Base, wanted: SpectrumKind) -> Result<&Model, (&'static str, SceneErrorKind)> {
@@ -194,7 +238,7 @@ fn illuminants(group: &Illuminants) -> Result<Lights, (&'static str, SceneErrorK
         None => model.clone(),
     };
     let failed = |e: RecipeError| (key(&e), SceneErrorKind::Recipe(e));
-    let mut recipe = recipe(&group.base, &model);
+    let mut recipe = recipe(&group.base, &model, group.fixed);
     let mut varying = None;
     match group.intensity {
         None => {}
@@ -229,6 +273,11 @@ fn with_mean(model: &Model, mean: &[f64]) -> Result<Model, SceneErrorKind> {
     Model::new(ModelParts { mean: new, ..parts.clone() }).map_err(SceneErrorKind::Model)
 }
 
+/// Whether an intensity multiplies a quantity of lights.
+pub(super) fn is_multiplied(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::Spectra | Quantity::Xyz | Quantity::LinearSrgb)
+}
+
 fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: usize) -> Vec<Array> {
     let base = group.base();
     let count = base.count as usize;
@@ -255,7 +304,10 @@ fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: us
         shape: shape.to_vec(),
         range: (quantity == Quantity::Spectra).then_some(range),
     };
-    let mut arrays = vec![array(Quantity::Spectra, !once || intensity.is_some(), &[count, bands])];
+    let mut arrays = Vec::new();
+    if base.wants(Quantity::Spectra) {
+        arrays.push(array(Quantity::Spectra, !once || intensity.is_some(), &[count, bands]));
+    }
     match intensity.map(|intensity| intensity.scope) {
         Some(IntensityScope::Scene) => arrays.push(array(Quantity::Intensity, true, &[])),
         Some(IntensityScope::Light) => arrays.push(array(Quantity::Intensity, true, &[count])),
@@ -268,6 +320,13 @@ fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: us
             arrays.push(array(Quantity::Xyz, true, &[count, 3]));
         }
         flat = matches!(aim, TargetConstraint::Flat(_));
+    }
+    for &quantity in Quantity::COLOURS {
+        // The given tristimulus values of a hue are among them already.
+        if base.wants(quantity) && arrays.iter().all(|array| array.quantity != quantity) {
+            let scales = intensity.is_some() && is_multiplied(quantity);
+            arrays.push(array(quantity, !once || scales, &[count, quantity.channels().len()]));
+        }
     }
     if !flat {
         arrays.push(array(Quantity::Attempts, !once, &[count]));

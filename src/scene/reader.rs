@@ -161,6 +161,20 @@ impl<'a> Entry<'a> {
         })
     }
 
+    /// A list of some words.
+    pub(super) fn choices<T: Copy>(
+        &self,
+        known: &[(&str, T)],
+        expected: &'static str,
+    ) -> Result<Vec<T>, Wrong> {
+        let items = self.value.as_array().ok_or_else(|| self.is_not(expected))?;
+        let item = |item: &'a Spanned<DeValue<'a>>| {
+            let (path, group) = (self.path.clone(), self.group.clone());
+            Entry { value: item.get_ref(), span: item.span(), path, group }.choice(known)
+        };
+        items.iter().map(item).collect()
+    }
+
     /// A list of numbers, if it is a list.
     pub(super) fn list(&self) -> Option<Result<Vec<f64>, Wrong>> {
         let items = self.value.as_array()?;

@@ -17,7 +17,7 @@ use super::session::{SharedSpectra, columns};
 
 const COPIES: &str = include_str!("../../shaders/scene_copies.wgsl");
 
-/// A scene's pipelines on a wgpu device.
+/// A scene's pipelines on a wgpu device, for the spectra of its groups, whatever else they are asked for.
 ///
 /// A guest as [`Sampler`] is: it never submits, polls or asks for a device of its own. `examples/scene.rs` has it in
 /// a renderer.
@@ -72,12 +72,13 @@ impl<'a> SceneSampler<'a> {
                 samplers.push(None);
                 continue;
             };
+            let program = drawing.recipe.program().spectra_alone();
             let same = |other: &GroupPlan| {
-                other.drawn_by_engine().is_some_and(|d| d.recipe.program() == drawing.recipe.program())
+                other.drawn_by_engine().is_some_and(|d| d.recipe.program().spectra_alone() == program)
             };
             samplers.push(Some(match scene.plans[..i].iter().position(same) {
                 Some(other) => samplers[other].clone().expect("the device draws it"),
-                None => Sampler::new(device, &drawing.recipe)?,
+                None => Sampler::of(device, &program)?,
             }));
         }
         let copies = scene.plans.iter().any(copies).then(|| pipeline(device));
@@ -92,7 +93,7 @@ impl<'a> SceneSampler<'a> {
         let plans = self.scene.plans.iter().zip(&self.samplers).zip(&self.once);
         let groups = plans.map(|((plan, sampler), once)| match (plan.drawn_by_engine(), sampler) {
             (Some(drawing), Some(sampler)) => self.drawn(device, plan, (drawing, sampler), scenes.clone()),
-            _ => made(device, plan, once.as_ref(), scenes.clone()),
+            _ => made(device, (plan, self.scene.grid.len()), once.as_ref(), scenes.clone()),
         });
         Ok(PreparedScene { groups: groups.collect::<Result<_, _>>()?, copies: self.copies.clone() })
     }
@@ -130,7 +131,7 @@ impl<'a> SceneSampler<'a> {
         let uniform = filled(device, "spectroll sizes", BufferUsages::UNIFORM, bytemuck::bytes_of(&sizes));
         let factors = bytemuck::cast_slice(&intensities);
         let factors = filled(device, "spectroll intensities", BufferUsages::STORAGE, factors);
-        let shapes = drawn.buffer(Quantity::Spectra).expect("the recipe asks for them");
+        let shapes = drawn.buffer(Quantity::Spectra).expect("the program has them");
         let buffers = [&uniform, shapes, &factors, &spectra];
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("spectroll copies"),
@@ -140,7 +141,7 @@ impl<'a> SceneSampler<'a> {
                 resource: buffers[binding as usize].as_entire_binding(),
             }),
         });
-        let values = plan.arrays.iter().find(|array| array.name == format!("{}_intensity", plan.name));
+        let values = plan.arrays.iter().find(|array| array.quantity == Quantity::Intensity);
         Ok(Group {
             plan,
             copied: Some(Copied { bindings, values: sizes.values }),
@@ -189,16 +190,15 @@ impl PreparedScene<'_> {
 /// A group that the CPU makes.
 fn made<'a>(
     device: &Device,
-    plan: &'a GroupPlan,
+    (plan, bands): (&'a GroupPlan, usize),
     once: Option<&SharedSpectra>,
     scenes: Range<u64>,
 ) -> Result<Group<'a>, EngineError> {
     let columns = columns(plan, once, None, scenes, &mut DrawSummary::default())?;
     let spectra = match once {
-        Some(once) if plan.intensity.is_none() => &once.spectra,
-        _ => &*columns.spectra,
+        Some(once) if plan.intensity.is_none() => once.of(Quantity::Spectra),
+        _ => columns.of(Quantity::Spectra),
     };
-    let bands = plan.arrays[0].shape[1];
     check(device, (spectra.len() / bands) as u64, bands)?;
     let label = format!("spectroll {}", plan.name);
     let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
@@ -257,4 +257,16 @@ fn pipeline(device: &Device) -> wgpu::ComputePipeline {
 fn filled(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
     let contents = if bytes.is_empty() { &[0; 4] } else { bytes };
     device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{COPIES, Sizes};
+    use crate::wgsl::layout::{assert_layout, offsets};
+
+    #[test]
+    fn sizes_lie_as_the_shader_reads_them() {
+        let members = offsets!(Sizes: values, bands, copies, lights);
+        assert_layout(COPIES, "Sizes", &members, size_of::<Sizes>());
+    }
 }

@@ -14,7 +14,7 @@ use crate::random::stream::DrawRange;
 
 use super::Scene;
 use super::group::IntensityScope;
-use super::plan::{Array, Drawing, GroupPlan, Shapes};
+use super::plan::{Array, Drawing, GroupPlan, Shapes, is_multiplied};
 
 /// Approximate size of a window in bytes, where no engine draws it.
 const WINDOW_BYTES: u64 = 8 << 20;
@@ -46,20 +46,18 @@ pub struct GroupSummary {
     pub summary: DrawSummary,
 }
 
-/// Spectra and statuses that serve all scenes, one for each element.
+/// Values and tallies that serve all scenes, of each element: spectra, and the quantities that its recipe asks for.
 pub(super) struct SharedSpectra {
-    pub(super) spectra: Vec<f32>,
+    values: Vec<(Quantity, Vec<f32>)>,
     pub(super) statuses: Vec<DrawStatus>,
 }
 
 /// The arrays of a group in a window, as they come: some are those of the engine.
 #[derive(Default)]
 pub(super) struct Columns<'a> {
-    pub(super) spectra: Cow<'a, [f32]>,
+    /// Every quantity of f32.
+    values: Vec<(Quantity, Cow<'a, [f32]>)>,
     attempts: Cow<'a, [u32]>,
-    intensity: Vec<f32>,
-    lrv: Vec<f32>,
-    xyz: Vec<f32>,
 }
 
 impl<'a> Window<'a> {
@@ -108,18 +106,23 @@ impl Scene {
 
 impl SharedSpectra {
     fn new(plan: &GroupPlan, drawing: &Drawing) -> Result<SharedSpectra, EngineError> {
-        let kernel = Kernel::<f32>::new(&drawing.recipe.program().spectra_alone());
+        let kernel = Kernel::<f32>::new(drawing.recipe.program());
         let stream = plan.stream.in_rows(drawing.places);
         let drawn = (0..u64::from(drawing.places)).into_par_iter().map(|place| kernel.draw(stream, place));
-        let (values, statuses): (Vec<_>, Vec<_>) = drawn.unzip();
+        let (drawn, statuses): (Vec<_>, Vec<_>) = drawn.unzip();
         check(plan, drawing.places, 0, &statuses)?;
-        let mut spectra = values.into_iter().flatten().flatten().collect::<Vec<f32>>();
-        let mut statuses = statuses;
-        if drawing.places < plan.count {
-            spectra = spectra.repeat(plan.count as usize);
-            statuses = statuses.repeat(plan.count as usize);
-        }
-        Ok(SharedSpectra { spectra, statuses })
+        // One for each element, or one for all.
+        let copies = (plan.count / drawing.places) as usize;
+        let formats = drawing.recipe.formats().into_iter().enumerate();
+        let values = formats.map(|(number, format)| {
+            let values: Vec<f32> = drawn.iter().flat_map(|values| &values[number]).copied().collect();
+            (format.quantity, values.repeat(copies))
+        });
+        Ok(SharedSpectra { values: values.collect(), statuses: statuses.repeat(copies) })
+    }
+
+    pub(super) fn of(&self, quantity: Quantity) -> &[f32] {
+        values_of(&self.values, quantity)
     }
 
     fn attempts(&self) -> Vec<u32> {
@@ -136,7 +139,7 @@ impl SceneSession<'_> {
             for array in plan.arrays.iter().filter(|array| !array.per_scene) {
                 let bytes = match array.quantity {
                     Quantity::Attempts => bytemuck::cast_slice(&once.attempts()).to_vec(),
-                    _ => bytemuck::cast_slice(&once.spectra).to_vec(),
+                    quantity => bytemuck::cast_slice(once.of(quantity)).to_vec(),
                 };
                 constants.push((array, bytes));
             }
@@ -225,20 +228,18 @@ pub(super) fn columns<'a>(
             summary.count(batch.statuses());
             // These tallies are attempts and nothing else: nothing was scaled.
             let attempts: &[u32] = bytemuck::cast_slice(batch.bytes(Quantity::Attempts));
-            let (spectra, attempts) = (batch.values(Quantity::Spectra), attempts);
-            if drawing.places == plan.count {
-                Columns { spectra: spectra.into(), attempts: attempts.into(), ..Columns::default() }
-            } else {
-                let (bands, copies) = (spectra.len() / count, plan.count as usize);
-                let spectra = spectra.chunks_exact(bands).flat_map(|s| s.repeat(copies)).collect::<Vec<_>>();
-                let attempts = attempts.iter().flat_map(|&a| vec![a; copies]).collect::<Vec<_>>();
-                Columns { spectra: spectra.into(), attempts: attempts.into(), ..Columns::default() }
-            }
+            let copies = (plan.count / drawing.places) as usize;
+            let formats = drawing.recipe.formats().into_iter();
+            let values = formats
+                .map(|format| (format.quantity, copied(batch.values(format.quantity), format.width, copies)));
+            Columns { values: values.collect(), attempts: copied(attempts, 1, copies) }
         }
-        (_, Some(once), _) => match plan.intensity {
-            Some(_) => Columns { spectra: once.spectra.repeat(count).into(), ..Columns::default() },
-            None => Columns::default(),
-        },
+        (_, Some(once), _) => {
+            let varies = |quantity| plan.intensity.is_some() && is_multiplied(quantity);
+            let varying = once.values.iter().filter(|(quantity, _)| varies(*quantity));
+            let values = varying.map(|(quantity, values)| (*quantity, Cow::Owned(values.repeat(count))));
+            Columns { values: values.collect(), ..Columns::default() }
+        }
         (Shapes::Target(target), ..) => {
             let elements = (scenes.start..scenes.end).into_par_iter();
             let elements = elements.flat_map_iter(|scene| (0..plan.count).map(move |e| (scene, e)));
@@ -247,12 +248,26 @@ pub(super) fn columns<'a>(
             let statuses: Vec<DrawStatus> = drawn.iter().filter_map(|drawn| drawn.status).collect();
             check(plan, plan.count, scenes.start, &statuses)?;
             summary.count(&statuses);
+            let values = |quantity| -> Vec<f32> {
+                match (quantity, &plan.observer) {
+                    (Quantity::Spectra, _) => drawn.iter().flat_map(|d| &d.spectrum).copied().collect(),
+                    (Quantity::Lrv, _) => drawn.iter().map(|d| d.lrv).collect(),
+                    (Quantity::Xyz, _) if drawn.iter().all(|d| d.xyz.is_some()) => {
+                        drawn.iter().filter_map(|d| d.xyz).flatten().collect()
+                    }
+                    (seen, Some(observer)) => {
+                        drawn.par_iter().flat_map_iter(|d| observer.see(&d.spectrum, seen)).collect()
+                    }
+                    (other, None) => unreachable!("targets have no {other}"),
+                }
+            };
+            let given = plan.arrays.iter().map(|array| array.quantity);
+            // A renderer takes the spectra, even where no array has them.
+            let wanted = given.filter(|quantity| !matches!(quantity, Quantity::Attempts | Quantity::Spectra));
+            let wanted = std::iter::once(Quantity::Spectra).chain(wanted);
             Columns {
-                lrv: drawn.iter().map(|drawn| drawn.lrv).collect(),
-                xyz: drawn.iter().filter_map(|drawn| drawn.xyz).flatten().collect(),
+                values: wanted.map(|quantity| (quantity, values(quantity).into())).collect(),
                 attempts: statuses.iter().map(|status| status.attempts()).collect(),
-                spectra: drawn.into_iter().flat_map(|drawn| drawn.spectrum).collect(),
-                ..Columns::default()
             }
         }
         _ => unreachable!("the engine draws the others"),
@@ -264,52 +279,64 @@ pub(super) fn columns<'a>(
         };
         let scenes = scenes.clone();
         let all = scenes.flat_map(|scene| (0..elements).map(move |element| (scene, element)));
-        columns.intensity = all.map(|(scene, e)| intensity.at(plan.stream, scene, e)).collect();
-        let each = columns.spectra.len() / columns.intensity.len();
-        let spectra = columns.spectra.to_mut().chunks_exact_mut(each);
-        for (spectra, intensity) in spectra.zip(&columns.intensity) {
-            spectra.iter_mut().for_each(|value| *value *= intensity);
+        let levels: Vec<f32> = all.map(|(scene, e)| intensity.at(plan.stream, scene, e)).collect();
+        for (_, values) in columns.values.iter_mut().filter(|(quantity, _)| is_multiplied(*quantity)) {
+            let each = values.len() / levels.len();
+            for (values, level) in values.to_mut().chunks_exact_mut(each).zip(&levels) {
+                values.iter_mut().for_each(|value| *value *= level);
+            }
         }
+        columns.values.push((Quantity::Intensity, levels.into()));
     }
     Ok(columns)
 }
 
-impl<'a> Columns<'a> {
-    /// The arrays of the group that have an entry a scene.
-    fn arrays(self, plan: &'a GroupPlan) -> Vec<(&'a Array, Cow<'a, [u8]>)> {
-        let bytes = |content| match content {
-            Quantity::Spectra => cast_bytes(&self.spectra),
-            Quantity::Attempts => cast_bytes(&self.attempts),
-            Quantity::Intensity => Cow::Owned(bytemuck::cast_slice(&self.intensity).to_vec()),
-            Quantity::Lrv => Cow::Owned(bytemuck::cast_slice(&self.lrv).to_vec()),
-            Quantity::Xyz => Cow::Owned(bytemuck::cast_slice(&self.xyz).to_vec()),
-            Quantity::Weights | Quantity::LinearSrgb => unreachable!("no group has them"),
-        };
-        plan.arrays.iter().filter(|a| a.per_scene).map(|array| (array, bytes(array.quantity))).collect()
+/// Values in rows of `width`, each row so many times.
+fn copied<T: Copy>(values: &[T], width: usize, copies: usize) -> Cow<'_, [T]>
+where
+    [T]: ToOwned<Owned = Vec<T>>,
+{
+    match copies {
+        1 => values.into(),
+        copies => values.chunks_exact(width).flat_map(|row| row.repeat(copies)).collect::<Vec<T>>().into(),
     }
 }
 
-impl Columns<'_> {
+/// The values of a quantity; none where it is not there.
+fn values_of<V: AsRef<[f32]>>(values: &[(Quantity, V)], quantity: Quantity) -> &[f32] {
+    values.iter().find(|(other, _)| *other == quantity).map_or(&[], |(_, values)| values.as_ref())
+}
+
+impl<'a> Columns<'a> {
+    /// The arrays of the group that have an entry a scene.
+    fn arrays(mut self, plan: &'a GroupPlan) -> Vec<(&'a Array, Cow<'a, [u8]>)> {
+        let mut bytes = |quantity| match quantity {
+            Quantity::Attempts => cast_bytes(std::mem::take(&mut self.attempts)),
+            quantity => {
+                let values = self.values.iter_mut().find(|(other, _)| *other == quantity);
+                cast_bytes(std::mem::take(&mut values.expect("the group gives it").1))
+            }
+        };
+        plan.arrays.iter().filter(|a| a.per_scene).map(|array| (array, bytes(array.quantity))).collect()
+    }
+
+    pub(super) fn of(&self, quantity: Quantity) -> &[f32] {
+        values_of(&self.values, quantity)
+    }
+
     /// The values of f32 besides spectra.
     pub(super) fn known<'c>(&self, plan: &'c GroupPlan) -> Vec<(&'c Array, Vec<f32>)> {
-        let values = |array: &'c Array| {
-            let values = match array.quantity {
-                Quantity::Intensity => &self.intensity,
-                Quantity::Lrv => &self.lrv,
-                Quantity::Xyz => &self.xyz,
-                _ => return None,
-            };
-            Some((array, values.clone()))
-        };
-        plan.arrays.iter().filter_map(values).collect()
+        let others = plan.arrays.iter().filter(|array| array.quantity != Quantity::Spectra);
+        let known = others.map(|array| (array, self.of(array.quantity).to_vec()));
+        known.filter(|(_, values)| !values.is_empty()).collect()
     }
 }
 
 /// The bytes of values, without a copy where they are borrowed.
-fn cast_bytes<'a, T: bytemuck::Pod>(values: &Cow<'a, [T]>) -> Cow<'a, [u8]> {
+fn cast_bytes<T: bytemuck::Pod>(values: Cow<'_, [T]>) -> Cow<'_, [u8]> {
     match values {
         Cow::Borrowed(values) => Cow::Borrowed(bytemuck::cast_slice(values)),
-        Cow::Owned(values) => Cow::Owned(bytemuck::cast_slice(values).to_vec()),
+        Cow::Owned(values) => Cow::Owned(bytemuck::cast_slice(&values).to_vec()),
     }
 }
 

@@ -7,7 +7,7 @@ use crate::cpu::Kernel;
 use crate::dataset::SpectrumKind;
 use crate::draw_status::DrawStatus;
 use crate::program::condition::Condition;
-use crate::program::{self, LrvTarget, Program};
+use crate::program::{self, LrvLaw, LrvTarget, Program};
 use crate::random::real::Arithmetic;
 use crate::random::stream::{self, Stream};
 use crate::recipe::{ProposalKind, Recipe, RecipeBuilder, RecipeError};
@@ -79,7 +79,8 @@ impl TargetPlan {
                     if recipe.program().proposal.is_some() {
                         return built(builder.clone().lrv(lrv).build()).map(|r| Kernel::new(r.program()));
                     }
-                    let target = recipe.program().target.clone().map(|target| LrvTarget { lrv, ..target });
+                    let target = recipe.program().target.clone();
+                    let target = target.map(|target| LrvTarget { lrv: LrvLaw::Fixed(lrv), ..target });
                     Ok(Kernel::new(&Program { target, ..recipe.program().clone() }))
                 };
                 Ok(match (levels, targets.copies) {
@@ -154,7 +155,7 @@ impl TargetPlan {
             }
             TargetPlan::Uniform { program, target, low, high } => {
                 let lrv = low + (high - low) * uniform(0);
-                let target = Some(LrvTarget { lrv, ..target.clone() });
+                let target = Some(LrvTarget { lrv: LrvLaw::Fixed(lrv), ..target.clone() });
                 drawn(&Kernel::new(&Program { target, ..(**program).clone() }), stream, at(scene), lrv)
             }
             TargetPlan::Xyz { kernel, y } => drawn(kernel, stream, at(scene), *y),

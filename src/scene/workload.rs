@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::Scene;
 use super::plan::{Array, GroupKind, GroupPlan, Shapes};
 use super::target::TargetPlan;
+use crate::quantity::Quantity;
 
 /// Workload of drawing a scene.
 #[derive(Clone, Debug, Serialize)]
@@ -64,6 +65,13 @@ impl Scene {
                 );
             }
             left_out.extend(spared(plan));
+            if !plan.gives(Quantity::Spectra) {
+                let drawn = if plan.drawn_by_engine().is_some() { "neither computed nor" } else { "not" };
+                left_out.push(format!(
+                    "{}: its spectra are {drawn} stored, for quantities does not name them",
+                    plan.name
+                ));
+            }
             let (draws_per_scene, draws_once) = draws(plan);
             groups.push(GroupWorkload {
                 name: plan.name.clone(),

@@ -6,14 +6,18 @@
 //! - `worst(z) -> u32`: the largest `excess` of a band before scaling;
 //! - `factor(z) -> f32`: the factor that scales it to the target, where there is one;
 //! - `is_accepted(z) -> bool`;
-//! - `scale(z, key, index, stream) -> f32`: the factor of a draw's spectrum, where it is scaled.
+//! - `scale(z, key, index, stream) -> f32`: what multiplies a draw's spectrum, where something does.
+//!
+//! Where each draw has a target of its own, `target_lrv_of(key, index, stream) -> f32` makes it, and the functions that
+//! depend on it take it: `factor(z, target_lrv)`, `scale(z, target_lrv)` and, where the scaled spectrum is bounded,
+//! `is_accepted(z, target_lrv)`.
 
 use super::tables::Tables;
 use super::text::{Text, float, list};
 use super::{COVER_AT, Form, LOOPED, LUMINANCE, NORMALS};
 use crate::affine::Affine;
 use crate::dataset::SpectrumKind;
-use crate::program::{IntensityLaw, Program, Source, Unit};
+use crate::program::{IntensityLaw, LrvLaw, LrvTarget, Program, Source, Unit};
 use crate::random::real::Arithmetic;
 use crate::random::stream;
 
@@ -24,12 +28,13 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
         Form::Looped => looped(program, tables),
     };
     if let Some(target) = &program.target {
-        text.block("fn factor(z: Normals) -> f32", |body| {
-            let (lrv, floor) = (float(target.lrv), <f32 as Arithmetic>::FLOOR);
-            body.line(&format!("return {lrv} / max(luminance(z), {floor:?}f);"));
-        });
+        factor(&mut text, target);
     }
-    text.block("fn is_accepted(z: Normals) -> bool", |body| {
+    let (parameter, argument) = match program.tests_own_targets() {
+        true => (", target_lrv: f32", ", target_lrv"),
+        false => ("", ""),
+    };
+    text.block(&format!("fn is_accepted(z: Normals{parameter}) -> bool"), |body| {
         // What the excess of every band must be below: that of 1, or of infinity.
         let bound = match program.kind {
             SpectrumKind::Reflectance if program.tests_base() => 1f32,
@@ -40,11 +45,15 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
             false => body.line(&format!("return worst(z) < {limit}u;")),
             true => {
                 body.line("let e = worst(z);");
-                body.line(&format!("return e < {limit}u && peak(e) * factor(z) < 1f;"));
+                body.line(&format!("return e < {limit}u && peak(e) * factor(z{argument}) < 1f;"));
             }
         }
     });
-    if program.scales() {
+    if program.has_own_targets() {
+        text.block("fn scale(z: Normals, target_lrv: f32) -> f32", |body| {
+            body.line("return factor(z, target_lrv);");
+        });
+    } else if program.scales() {
         text.block("fn scale(z: Normals, key: vec2<u32>, index: vec2<u32>, stream: u32) -> f32", |body| {
             match &program.intensity {
                 Some(level) => draw_level(body, level, tables),
@@ -55,8 +64,34 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
     text.0
 }
 
+/// What scales a candidate to the target, and each draw's target where it has its own.
+fn factor(text: &mut Text, target: &LrvTarget) {
+    let floor = <f32 as Arithmetic>::FLOOR;
+    match target.lrv {
+        LrvLaw::Fixed(lrv) => text.block("fn factor(z: Normals) -> f32", |body| {
+            body.line(&format!("return {} / max(luminance(z), {floor:?}f);", float(lrv)));
+        }),
+        LrvLaw::Uniform { low, span, high } => {
+            let head = "fn target_lrv_of(key: vec2<u32>, index: vec2<u32>, stream: u32) -> f32";
+            text.block(head, |body| {
+                body.line(&draw_word());
+                let [low, span, high] = [low, span, high].map(float);
+                body.line(&format!("return min({low} + {span} * uniform_of(word), {high});"));
+            });
+            text.block("fn factor(z: Normals, target_lrv: f32) -> f32", |body| {
+                body.line(&format!("return target_lrv / max(luminance(z), {floor:?}f);"));
+            });
+        }
+    }
+}
+
+/// The word of a draw's own.
+fn draw_word() -> String {
+    format!("let word = philox(vec4(index, 0u, stream | {}u), key).x;", stream::DRAW_BLOCK)
+}
+
 fn draw_level(body: &mut Text, level: &IntensityLaw, tables: &Tables) {
-    body.line(&format!("let word = philox(vec4(index, 0u, stream | {}u), key).x;", stream::DRAW_BLOCK));
+    body.line(&draw_word());
     match level {
         IntensityLaw::LogUniform { low, octaves } => {
             body.line(&format!(

@@ -8,6 +8,8 @@
 
 mod arithmetic;
 mod cover;
+#[cfg(test)]
+pub(crate) mod layout;
 mod module;
 #[cfg(test)]
 mod probe;
@@ -48,6 +50,7 @@ const MUL_WIDE: &str = include_str!("../../shaders/mul_wide.wgsl");
 const MUL_WIDE_INT64: &str = include_str!("../../shaders/mul_wide_int64.wgsl");
 const PHILOX: &str = include_str!("../../shaders/philox.wgsl");
 const NORMAL: &str = include_str!("../../shaders/normal.wgsl");
+const UNIFORM: &str = include_str!("../../shaders/uniform.wgsl");
 const LOG_UNIFORM: &str = include_str!("../../shaders/log_uniform.wgsl");
 const PHYSICAL: &str = include_str!("../../shaders/physical.wgsl");
 const LOOPED: &str = include_str!("../../shaders/arithmetic_looped.wgsl");
@@ -133,6 +136,7 @@ pub(crate) fn shader(program: &Program, target: Dialect) -> (String, Tables) {
 fn functions(program: &Program, tables: &Tables, target: Dialect) -> String {
     let is = |word: &str| match word {
         "scaled" => program.scales(),
+        "own_targets" => program.has_own_targets(),
         "covered" => program.proposal.is_some(),
         "plain" => program.proposal.is_none(),
         other => unreachable!("draw.wgsl has a line for programs that are {other:?}"),
@@ -142,9 +146,18 @@ fn functions(program: &Program, tables: &Tables, target: Dialect) -> String {
         None => Some(line.to_owned() + "\n"),
     };
     let draw: String = DRAW.lines().filter_map(line).collect();
+    let judged = if program.tests_own_targets() { "z, result.target_lrv" } else { "z" };
+    let scaled = match program.has_own_targets() {
+        true => "result.z, result.target_lrv",
+        false => "result.z, key, index, stream",
+    };
+    let draw = draw.replace("JUDGED", judged).replace("SCALED", scaled);
     let mut parts = vec![generator(target), PHYSICAL.to_owned()];
     if let Some(IntensityLaw::LogUniform { .. }) = program.intensity {
-        parts.push(LOG_UNIFORM.to_owned());
+        parts.push(LOG_UNIFORM.replace("UNIFORM\n", UNIFORM));
+    }
+    if program.has_own_targets() {
+        parts.push(UNIFORM.to_owned());
     }
     parts.extend([arithmetic(program, tables), draw]);
     parts.join("\n")
@@ -157,11 +170,11 @@ mod tests {
     use super::*;
     use crate::affine::Affine;
     use crate::dataset::SpectrumKind;
-    use crate::program::{self, Bounds, Output, Source, Unit};
+    use crate::program::{self, Bounds, LrvLaw, Output, Source, Unit};
     use crate::quantity::{ArrayFormat, Layout};
 
     /// A program of 3 bands and 2 components, small enough to read.
-    fn small(kind: SpectrumKind, target: Option<(f64, Bounds)>) -> Program {
+    fn small(kind: SpectrumKind, target: Option<(LrvLaw, Bounds)>) -> Program {
         program_of(kind, 3, 2, target)
     }
 
@@ -169,7 +182,7 @@ mod tests {
         kind: SpectrumKind,
         bands: usize,
         components: usize,
-        target: Option<(f64, Bounds)>,
+        target: Option<(LrvLaw, Bounds)>,
     ) -> Program {
         let weights = vec![1.0 / bands as f64; bands];
         let spectrum = Affine {
@@ -214,6 +227,11 @@ mod tests {
                 ArrayFormat { quantity: Quantity::Intensity, dtype: Dtype::F32, ..ArrayFormat::status() };
             outputs.push(Output { format, source: Source::Intensity });
         }
+        if program.has_own_targets() {
+            let format = ArrayFormat { quantity: Quantity::Lrv, dtype: Dtype::F32, ..ArrayFormat::status() };
+            outputs.push(Output { format, source: Source::TargetLrv });
+        }
+        outputs.sort_by_key(|output| output.format.quantity);
         Program { outputs, ..program }
     }
 
@@ -224,6 +242,21 @@ mod tests {
         program
     }
 
+    /// The program with chromaticities alone.
+    fn chromaticity(program: Program) -> Program {
+        let n = program.bands();
+        let xyz = program.spectrum.project(&[vec![0.5; n], vec![0.25; n], vec![0.125; n]]);
+        let map = xyz.project(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let format = ArrayFormat {
+            quantity: Quantity::Chromaticity,
+            dtype: Dtype::F32,
+            width: map.offset.len(),
+            layout: Layout::Rows,
+        };
+        let sum = Unit::Over(xyz.project(&[[1.0; 3]]));
+        Program { outputs: vec![Output { format, source: Source::Map(map, sum) }], ..program }
+    }
+
     fn validate(text: &str, capabilities: Capabilities) -> Result<(), String> {
         let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
         let mut validator = Validator::new(ValidationFlags::all(), capabilities);
@@ -232,19 +265,19 @@ mod tests {
 
     /// Programs of every kind, size and layout.
     fn programs() -> Vec<Program> {
-        let rules = [None, Some(Bounds::Base), Some(Bounds::Scaled), Some(Bounds::Both)];
+        let rules = [Bounds::Base, Bounds::Scaled, Bounds::Both];
+        let laws = [LrvLaw::Fixed(0.4), LrvLaw::uniform(0.2, 0.6)];
         let mut programs = Vec::new();
         for (bands, components) in [(1, 1), (3, 2), (31, 6), (61, 12), (70, 64), (1000, 64)] {
-            let of = |kind, rule: Option<Bounds>| {
-                program_of(kind, bands, components, rule.map(|bounds| (0.4, bounds)))
-            };
+            let of = |kind, target| program_of(kind, bands, components, target);
             programs.push(of(SpectrumKind::Illuminant, None));
             for level in
                 [IntensityLaw::LogUniform { low: 0.5, octaves: 10.0 }, IntensityLaw::OneOf(vec![1.0, 2.0])]
             {
                 programs.push(Program { intensity: Some(level), ..of(SpectrumKind::Illuminant, None) });
             }
-            programs.extend(rules.map(|rule| of(SpectrumKind::Reflectance, rule)));
+            let targets = laws.into_iter().flat_map(|law| rules.map(|bounds| Some((law, bounds))));
+            programs.extend([None].into_iter().chain(targets).map(|t| of(SpectrumKind::Reflectance, t)));
         }
         let layouts = [Layout::Rows, Layout::PaddedRows, Layout::Planes];
         let all = programs.clone().into_iter().flat_map(|program| {
@@ -252,7 +285,8 @@ mod tests {
                 [Dtype::F32, Dtype::F16].map(|spectra| with_all(program.clone(), layout, spectra))
             })
         });
-        all.chain(programs).collect()
+        let colours: Vec<_> = programs.iter().cloned().map(chromaticity).collect();
+        all.chain(programs).chain(colours).collect()
     }
 
     #[test]
@@ -298,7 +332,8 @@ mod tests {
     fn what_is_generated() {
         let light = || small(SpectrumKind::Illuminant, None);
         let surface = |target| small(SpectrumKind::Reflectance, target);
-        let lrv = |bounds| surface(Some((0.4, bounds)));
+        let lrv = |bounds| surface(Some((LrvLaw::Fixed(0.4), bounds)));
+        let own_lrv = |bounds| surface(Some((LrvLaw::uniform(0.2, 0.6), bounds)));
         let level = IntensityLaw::LogUniform { low: 0.15, octaves: 10.0 };
         let lamp = || Program { intensity: Some(level.clone()), ..light() };
         let lamps = || Program { intensity: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..light() };
@@ -325,26 +360,36 @@ mod tests {
             ("weights", only(surface(None), Quantity::Weights), Dialect::Baseline),
             ("xyz", only(surface(None), Quantity::Xyz), Dialect::Baseline),
             ("xyz_of_illuminant", only(light(), Quantity::Xyz), Dialect::Baseline),
+            ("chromaticity", chromaticity(lamp()), Dialect::Baseline),
             ("attempts", only(surface(None), Quantity::Attempts), Dialect::Baseline),
             ("lrv_base", lrv(Bounds::Base), Dialect::Baseline),
             ("lrv_scaled", lrv(Bounds::Scaled), Dialect::Baseline),
             ("lrv_both_in_pairs", lrv(Bounds::Both), Dialect::SoftwareInt64),
+            ("own_lrv_base", with_all(own_lrv(Bounds::Base), Layout::Rows, Dtype::F32), Dialect::Baseline),
+            ("own_lrv_scaled", own_lrv(Bounds::Scaled), Dialect::Baseline),
+            (
+                "own_lrv_both_in_pairs",
+                with_all(own_lrv(Bounds::Both), Layout::Planes, Dtype::F16),
+                Dialect::SoftwareInt64,
+            ),
         ] {
             insta::assert_snapshot!(name, generated(&program, target));
         }
-        let large = |layout, spectra| {
+        let large = |law, layout, spectra| {
             with_all(
-                program_of(SpectrumKind::Reflectance, 400, 6, Some((0.4, Bounds::Both))),
+                program_of(SpectrumKind::Reflectance, 400, 6, Some((law, Bounds::Both))),
                 layout,
                 spectra,
             )
         };
-        for (name, layout, spectra) in [
-            ("looped", Layout::Rows, Dtype::F32),
-            ("looped_in_halves", Layout::PaddedRows, Dtype::F16),
-            ("looped_in_planes", Layout::Planes, Dtype::F16),
+        let fixed = LrvLaw::Fixed(0.4);
+        for (name, law, layout, spectra) in [
+            ("looped", fixed, Layout::Rows, Dtype::F32),
+            ("looped_in_halves", fixed, Layout::PaddedRows, Dtype::F16),
+            ("looped_in_planes", fixed, Layout::Planes, Dtype::F16),
+            ("looped_own_lrv", LrvLaw::uniform(0.2, 0.6), Layout::Rows, Dtype::F32),
         ] {
-            insta::assert_snapshot!(name, generated(&large(layout, spectra), Dialect::Int64));
+            insta::assert_snapshot!(name, generated(&large(law, layout, spectra), Dialect::Int64));
         }
     }
 
@@ -360,6 +405,12 @@ mod tests {
         let one = format!("{}u", 1f32.to_bits() - 1);
         let infinity = format!("{}u", f32::INFINITY.to_bits() - 1);
         assert!(plain.contains(&one) && !plain.contains(&infinity));
+        let fixed = text(&small(SpectrumKind::Reflectance, Some((LrvLaw::Fixed(0.4), Bounds::Both))));
+        let own = text(&small(SpectrumKind::Reflectance, Some((LrvLaw::uniform(0.2, 0.6), Bounds::Both))));
+        for word in ["uniform_of", "target_lrv", "result.target_lrv = "] {
+            assert!(own.contains(word) && !fixed.contains(word), "{word}");
+        }
+        assert!(!own.contains("power_of_two"));
         let light = text(&small(SpectrumKind::Illuminant, None));
         assert!(light.contains(&infinity) && !light.contains(&one));
         let xyz = text(&only(small(SpectrumKind::Reflectance, None), Quantity::Xyz));

@@ -65,6 +65,7 @@ fn interface(program: &Program) -> String {
             Source::Map(_, unit) => {
                 let (result, head) = match quantity {
                     Quantity::Xyz | Quantity::LinearSrgb => ("vec3<f32>".to_owned(), "vec3".to_owned()),
+                    Quantity::Chromaticity => ("vec2<f32>".to_owned(), "vec2".to_owned()),
                     Quantity::Lrv => ("f32".to_owned(), String::new()),
                     _ => (format!("array<f32, {width}>"), "array".to_owned()),
                 };
@@ -83,6 +84,9 @@ fn interface(program: &Program) -> String {
             }
             Source::Intensity => text.block(&format!("fn {quantity}(d: Draw) -> f32"), |body| {
                 body.line("return d.scale;");
+            }),
+            Source::TargetLrv => text.block(&format!("fn {quantity}(d: Draw) -> f32"), |body| {
+                body.line("return d.target_lrv;");
             }),
             Source::Status => {} // it is in the Draw
         }

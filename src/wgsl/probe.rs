@@ -5,10 +5,14 @@ use wgpu::BufferUsages;
 use wgpu::util::DeviceExt;
 
 use crate::engine::{Engine, EngineChoice};
+use crate::model::Model;
+use crate::program::Bounds;
+use crate::quantity::Quantity;
 use crate::random::normal::{circle, radius};
 use crate::random::philox::{KNOWN_ANSWERS, philox};
 use crate::random::stream::Stream;
 use crate::random::truncated::truncated;
+use crate::recipe::Recipe;
 use crate::wgsl::{Dialect, generator};
 
 /// Runs `body` for each `i` on the best adapter, and returns `output`.
@@ -200,4 +204,34 @@ fn candidates_of_a_cover_are_those_of_their_twin() {
     }
     let found = found.expect("every adapter runs the baseline");
     assert!(ulps(&found, expected.into_iter()) <= allowed_ulps());
+}
+
+/// The functions that a host calls: a draw's own target, and the spectrum that was scaled to it.
+#[test]
+fn modules_make_the_draws_of_their_recipe() {
+    const COUNT: u64 = 4097;
+    let model = Model::builtin("munsell-vrhel").unwrap();
+    for bounds in [Bounds::Base, Bounds::Scaled, Bounds::Both] {
+        let recipe = Recipe::builder(&model).lrv(0.2..0.8).bounds(bounds);
+        let recipe = recipe.quantities([Quantity::Spectra, Quantity::Lrv]).build().unwrap();
+        let stream = Stream::named(0x0123_4567_89AB_CDEF, "wall");
+        let body = format!(
+            "if i < arrayLength(&output) / 3u {{
+                let d = wall_draw_in({}u, vec2(0x89ABCDEFu, 0x01234567u), vec2(i, 0u));
+                output[3u*i] = bitcast<u32>(wall_lrv(d)) + input[0];
+                output[3u*i+1u] = bitcast<u32>(wall_at(d, 0u));
+                output[3u*i+2u] = bitcast<u32>(wall_spectrum(d)[30]);
+            }}",
+            stream.id()
+        );
+        let words = 3 * COUNT as usize;
+        let found = run_with(Dialect::Baseline, &recipe.wgsl("wall").unwrap(), &[], &body, &[0], words);
+        let sampler = recipe.scalar_sampler::<f32>();
+        let expected = (0..COUNT).flat_map(|index| {
+            let drawn = sampler.draw(stream, index);
+            [drawn.values(Quantity::Lrv)[0], drawn.spectrum()[0], drawn.spectrum()[30]]
+        });
+        let found = found.expect("every adapter runs the baseline");
+        assert!(ulps(&found, expected) <= allowed_ulps(), "{bounds:?}");
+    }
 }

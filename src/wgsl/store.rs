@@ -137,6 +137,7 @@ impl Store<'_> {
                 }
             }
             Source::Intensity => format!("{d}.scale"),
+            Source::TargetLrv => format!("{d}.target_lrv"),
             Source::Status if self.program.may_exceed_one() => {
                 let above_one = format!("ok_{d} && peak(worst({d}.z)) * {d}.scale >= 1f");
                 return format!("{d}.attempts | select(0u, {}u, {above_one})", DrawStatus::ABOVE_ONE);

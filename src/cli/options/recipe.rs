@@ -2,18 +2,19 @@
 
 use clap::ValueEnum;
 use spectroll::{
-    Bounds, DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, Model, ProposalKind, Quantity, Recipe, RecipeError,
-    RecipeSettings, XyzScale,
+    Bounds, DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, Lrv, Model, ProposalKind, Quantity, Recipe,
+    RecipeError, RecipeSettings, XyzScale,
 };
 
 /// The rule that draws must meet, and the quantities to write of them.
 #[derive(Clone, clap::Args)]
 pub(in crate::cli) struct RecipeArguments {
     /// Scale every reflectance to this luminous reflectance value (LRV): CIE Y of the 1931 2 degree observer under D65,
-    /// 1 for a perfect white
-    #[arg(long, value_name = "Y", allow_negative_numbers = true)]
-    pub(in crate::cli) lrv: Option<f64>,
-    /// Spectrum that must be between 0 and 1 where there is an --lrv
+    /// 1 for a perfect white; or, as LOW..HIGH, each to one of its own, uniform between the two (--quantities lrv
+    /// writes it)
+    #[arg(long, value_name = "Y|LOW..HIGH", allow_negative_numbers = true, value_parser = lrv)]
+    pub(in crate::cli) lrv: Option<Lrv>,
+    /// What must be between 0 and 1 where there is an --lrv
     #[arg(long, value_enum, default_value = "base", requires = "lrv")]
     bounds: Bounds,
     /// Multiply the covariance of the weights
@@ -75,6 +76,31 @@ impl RecipeArguments {
             max_attempts: self.max_attempts,
         }
     }
+}
+
+/// A target LRV. What no model could reach is left to the recipe, which knows the model.
+fn lrv(text: &str) -> Result<Lrv, String> {
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    let parsed = match text.split_once("..") {
+        Some((low, high)) => number(low).zip(number(high)).map(|(low, high)| Lrv::Uniform(low, high)),
+        None => number(text).map(Lrv::Fixed),
+    };
+    let is_percentage = |value: f64| (2.0..100.0).contains(&value);
+    let instead = match parsed {
+        None => return Err("expected a number or LOW..HIGH, as in 0.4 or 0.2..0.6".to_owned()),
+        Some(Lrv::Fixed(lrv)) if is_percentage(lrv) => format!("{}", lrv / 100.0),
+        Some(Lrv::Uniform(low, high)) if is_percentage(high) && low < high => {
+            format!("{}..{}", low / 100.0, high / 100.0)
+        }
+        Some(Lrv::Uniform(low, high)) if low > high => {
+            return Err(format!("the lower end comes first; did you mean {high}..{low}?"));
+        }
+        Some(Lrv::Uniform(low, high)) if low == high => {
+            return Err(format!("the ends are the same; did you mean {low}?"));
+        }
+        Some(lrv) => return Ok(lrv),
+    };
+    Err(format!("--lrv is a fraction between 0 and 1; did you mean {instead}?"))
 }
 
 fn intensity(text: &str) -> Result<Intensity, String> {

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use spectroll::export::{Destination, Output};
+use spectroll::export::{Companions, Destination, Output};
 use spectroll::output::{Field, FileFormat, Schema};
 use spectroll::{Engine, Recipe, Stream};
 
@@ -26,7 +26,9 @@ pub(in crate::cli) struct DryRun {
     arrays: Vec<Array>,
     /// Size in bytes; approximate for text.
     bytes: u64,
-    /// Number of chunks, and of draws in each; `None` for a single file.
+    /// How many files there would be of text, in a folder.
+    files: Option<u64>,
+    /// How many chunks there would be, and how many draws each has; nothing of a single file.
     chunks: Option<(u64, u64)>,
     /// The share of candidates that are accepted.
     acceptance: f64,
@@ -49,7 +51,7 @@ struct Array {
 impl DryRun {
     pub(in crate::cli) fn new(
         output: &Output,
-        schema: &Schema,
+        (schema, companions): (&Schema, &Companions),
         recipe: &Recipe,
         engine: &Engine,
     ) -> anyhow::Result<DryRun> {
@@ -74,6 +76,7 @@ impl DryRun {
             draws: schema.count,
             arrays: schema.fields.iter().map(array).collect(),
             bytes: schema.count.saturating_mul(row),
+            files: output.text_files(schema, companions),
             chunks,
             acceptance: recipe.acceptance(),
             engine: engine.to_string(),
@@ -97,11 +100,14 @@ impl DryRun {
             writeln!(out, "  {name}: {shape:?} {dtype}")?;
         }
         let bytes = size(self.bytes);
+        if let Some(files) = self.files {
+            writeln!(out, "  {}, about {bytes} of text", folder_of(files))?;
+        }
         match (self.chunks, self.destination) {
             (Some((chunks, draws)), _) => {
                 writeln!(out, "  {bytes} in {} chunks of {} draws", grouped(chunks), grouped(draws))?;
             }
-            (None, Destination::SpdFolder) => writeln!(out, "  {} files of text", grouped(self.draws))?,
+            (None, Destination::SpdFolder) => {}
             (None, Destination::Stdout(FileFormat::Csv) | Destination::File(FileFormat::Csv)) => {
                 writeln!(out, "  about {bytes} of text")?
             }
@@ -116,6 +122,12 @@ impl DryRun {
         }
         Ok(())
     }
+}
+
+/// What is made where the name may look like that of a file.
+pub(in crate::cli) fn folder_of(files: u64) -> String {
+    let plural = if files == 1 { "" } else { "s" };
+    format!("a folder of {} file{plural}", grouped(files))
 }
 
 /// Draws a second, of a short trial.

@@ -7,7 +7,7 @@ use spectroll::export::{ExportError, Rows, Writing};
 use spectroll::output::SetStatus;
 
 use super::interrupt::{self, Interrupted};
-pub(super) use dry_run::{DryRun, free, room};
+pub(super) use dry_run::{DryRun, folder_of, free, room};
 use progress::{Progress, Shown};
 
 /// Draws the rows that are missing, shows how far that is, and completes the output.

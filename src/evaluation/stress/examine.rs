@@ -136,7 +136,7 @@ pub(super) fn examine(engine: &Engine, recipe: &Recipe, draws: DrawRange) -> Res
             let errors = row.iter().zip(spectrum).map(|(&a, b)| (f64::from(a) - b).abs() / size);
             let lrv = program.target.as_ref().map_or(0.0, |target| {
                 let lrv: f64 = target.weights.iter().zip(row).map(|(w, &s)| w * f64::from(s)).sum();
-                (lrv / target.lrv - 1.0).abs()
+                (lrv / target.lrv.largest() - 1.0).abs()
             });
             Some((errors.fold(0.0, f64::max), lrv))
         })

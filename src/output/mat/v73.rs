@@ -1,9 +1,4 @@
-//! MATLAB v7.3: HDF5 with a header and the classes of the variables.
-//!
-//! By the names that two toolboxes look for. Psychtoolbox: spectra in the columns of `X`, and `S_X` = [start step
-//! count] beside it. ISET: `wavelength`, `data` (which is `X` under a second name, and takes no room) and `comment`.
-//! Other quantities have their own names, and their draws in columns as well: MATLAB counts down the columns first, so
-//! that is the order in which draws come.
+//! Version 7.3: HDF5 with a header and the classes of the variables.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -11,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use rust_hdf5::{H5Dataset, H5File, Hdf5Error};
 
-use super::Encoder;
-use super::h5::{self, io_error};
-use super::schema::Schema;
+use super::Contents;
+use crate::output::Encoder;
+use crate::output::h5::{self, io_error};
 use crate::quantity::Dtype;
 
 /// Bytes before the HDF5 part: 116 characters of text, and a version.
@@ -26,19 +21,10 @@ pub(super) struct Mat {
 }
 
 impl Mat {
-    pub(super) fn begin(path: &Path, schema: &Schema) -> io::Result<Self> {
-        let mut schema = schema.clone();
-        for field in &mut schema.fields {
-            if field.name == "spectra" {
-                field.name = "X".to_owned();
-            }
-            // Every array of MATLAB's has two dimensions.
-            if !field.is_list() {
-                field.axis = Some("value".to_owned());
-            }
-        }
+    pub(super) fn begin(path: &Path, contents: &Contents) -> io::Result<Self> {
+        let schema = &contents.schema;
         let file = h5::create(path, USERBLOCK).map_err(io_error)?;
-        let tables = h5::Tables::new(&file, &schema).map_err(io_error)?;
+        let tables = h5::Tables::new(&file, schema).map_err(io_error)?;
         let begin = || {
             for (field, table) in schema.fields.iter().zip(&tables.tables) {
                 class(&table.set, matlab_class(field.stored))?;
@@ -46,19 +32,14 @@ impl Mat {
                     file.root_group().link("data", "X")?;
                 }
             }
-            for constant in &schema.shared {
-                let mut constant = constant.clone();
-                if constant.axes.len() == 1 {
-                    constant.axes.push(("value".to_owned(), 1));
-                }
-                let set = h5::constant(&file, &constant)?;
-                class(&set, matlab_class(constant.dtype))?;
+            for shared in &schema.shared {
+                let set = h5::constant(&file, shared)?;
+                class(&set, matlab_class(shared.dtype))?;
             }
             let wavelengths = &schema.wavelengths;
             row(&file, "wavelength", wavelengths, &[1, wavelengths.len()])?;
-            if let [first, ..] = wavelengths[..] {
-                let step = wavelengths.get(1).map_or(1.0, |second| second - first);
-                row(&file, "S_X", &[first, step, wavelengths.len() as f64], &[3, 1])?;
+            if let Some(sampling) = contents.sampling() {
+                contents.samplings.iter().try_for_each(|name| row(&file, name, &sampling, &[3, 1]))?;
             }
             comment(&file, &schema.attributes_text())
         };
@@ -88,7 +69,7 @@ fn matlab_class(dtype: Dtype) -> &'static str {
         Dtype::F32 => "single",
         Dtype::F64 => "double",
         Dtype::U32 => "uint32",
-        Dtype::F16 => unreachable!("the format holds no halves: see Format::check"),
+        Dtype::F16 => unreachable!("the format holds no halves: see FileFormat::check"),
     }
 }
 
