@@ -1,16 +1,16 @@
-//! Affine maps of the standard normals of a draw, which everything linear in a spectrum is.
+//! Affine maps of a draw's standard normals: the form of everything linear in a spectrum.
 
-/// offset + gain . z: m values of k standard normals.
+/// Affine map offset + gain . z from k standard normals z to m values.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Affine {
-    /// The values at z = 0, m of them.
+    /// Values at z = 0: m of them.
     pub(crate) offset: Vec<f64>,
-    /// What each standard normal adds, k rows of m values.
+    /// Change of each value per unit of each standard normal: k rows of m values.
     pub(crate) gain: Vec<Vec<f64>>,
 }
 
 impl Affine {
-    /// The products of the values with each row of `weights`.
+    /// Returns the products of the values with each row of `weights`.
     pub(crate) fn project(&self, weights: &[impl AsRef<[f64]>]) -> Affine {
         let product = |values: &[f64]| {
             let dot = |row: &[f64]| row.iter().zip(values).map(|(w, v)| w * v).sum::<f64>();
@@ -19,13 +19,13 @@ impl Affine {
         Affine { offset: product(&self.offset), gain: self.gain.iter().map(|g| product(g)).collect() }
     }
 
-    /// One of the values alone.
+    /// Returns the map of the value with this number alone.
     pub(crate) fn value(&self, number: usize) -> Affine {
         let gain = self.gain.iter().map(|gain| vec![gain[number]]).collect();
         Affine { offset: vec![self.offset[number]], gain }
     }
 
-    /// Always `value`.
+    /// Returns the map that is `value` whatever z is.
     pub(crate) fn constant(value: f64, components: usize) -> Affine {
         Affine { offset: vec![value], gain: vec![vec![0.0]; components] }
     }

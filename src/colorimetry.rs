@@ -1,5 +1,5 @@
-//! CIE 1931 colorimetry on a grid: the only home of the colour matching functions, of D65, and of the weights that
-//! turn a reflectance into its luminous reflectance value (LRV).
+//! CIE 1931 colorimetry on a grid: the only home of the colour matching functions of the 2 degree observer, of D65,
+//! and of the weights that turn a reflectance into its luminous reflectance (LRV).
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,7 +11,7 @@ pub fn d65(grid: Grid) -> Vec<f64> {
     on_grid(BuiltinTable::D65, 0, grid)
 }
 
-/// The CIE 1931 colour matching functions x, y and z on a grid; zero outside 360 to 830 nm.
+/// The CIE 1931 2 degree observer's colour matching functions x, y and z on a grid; zero outside 360 to 830 nm.
 pub fn cmf(grid: Grid) -> [Vec<f64>; 3] {
     [0, 1, 2].map(|function| on_grid(BuiltinTable::Xyz1931, function, grid))
 }
@@ -29,26 +29,27 @@ fn on_grid(table: BuiltinTable, spectrum: usize, grid: Grid) -> Vec<f64> {
     grid.wavelengths().map(|w| spline.at(w, Extrapolation::Zero)).collect()
 }
 
-/// The weights of X, Y and Z for reflectances under D65: tristimulus values are their products with a reflectance,
-/// and a perfect white has Y = 1. `None` where the grid has no light that the eye sees.
+/// Weights of X, Y and Z for reflectances under D65 (1931 2 degree observer): tristimulus values are their products
+/// with a reflectance, and a perfect white has Y = 1. `None` where the grid has no visible light.
 pub fn xyz_weights(grid: Grid) -> Option<[Vec<f64>; 3]> {
     xyz_weights_under(&d65(grid), grid)
 }
 
-/// The same under another illuminant, of which each band has its power, in any unit. `None` where none of it is seen.
+/// Weights of X, Y and Z for reflectances under `light`, the power of an illuminant in each band, in any unit: a
+/// perfect white has Y = 1. `None` where none of its light is visible.
 pub fn xyz_weights_under(light: &[f64], grid: Grid) -> Option<[Vec<f64>; 3]> {
     let cmf = cmf(grid);
     let white: f64 = light.iter().zip(&cmf[1]).map(|(e, y)| e * y).sum();
     (white > 0.0).then(|| cmf.map(|f| light.iter().zip(&f).map(|(e, f)| e * f / white).collect()))
 }
 
-/// The weights of the luminous reflectance value, LRV(r) = sum r D65 y / sum D65 y: they sum to 1, so a perfect
-/// white has LRV 1. `None` where the grid has no light that the eye sees.
+/// Weights of the luminous reflectance, LRV(r) = sum r D65 y / sum D65 y: CIE Y of the 1931 2 degree observer under
+/// D65. They sum to 1, so a perfect white has LRV 1. `None` where the grid has no visible light.
 pub fn lrv_weights(grid: Grid) -> Option<Vec<f64>> {
     xyz_weights(grid).map(|[_, y, _]| y)
 }
 
-/// The linear Rec. 709 components of X, Y and Z relative to D65 white, a row each (IEC 61966-2-1).
+/// Matrix from XYZ relative to D65 white to linear Rec. 709 components, a row each (IEC 61966-2-1).
 #[rustfmt::skip]
 pub const XYZ_TO_SRGB: [[f64; 3]; 3] = [
     [ 3.2406255, -1.537208,  -0.4986286],
@@ -56,18 +57,18 @@ pub const XYZ_TO_SRGB: [[f64; 3]; 3] = [
     [ 0.0557101, -0.2040211,  1.0569959],
 ];
 
-/// Linear Rec. 709 components of XYZ relative to D65 white, unclamped.
+/// Linear Rec. 709 components of XYZ relative to D65 white, unclamped: negative or above 1 outside the gamut.
 pub fn linear_srgb(xyz: [f64; 3]) -> [f64; 3] {
     XYZ_TO_SRGB.map(|row| row.iter().zip(xyz).map(|(m, v)| m * v).sum())
 }
 
-/// XYZ relative to D65 white of linear Rec. 709 components: the inverse of [`linear_srgb`], to rounding.
+/// XYZ relative to D65 white from linear Rec. 709 components: the inverse of [`linear_srgb`], to rounding.
 pub fn linear_srgb_to_xyz(linear: [f64; 3]) -> [f64; 3] {
     let inverse = Matrix3::from_fn(|row, column| XYZ_TO_SRGB[row][column]).try_inverse();
     (inverse.expect("the matrix has an inverse") * Vector3::from(linear)).into()
 }
 
-/// 8-bit sRGB of linear components (IEC 61966-2-1), which are clamped to 0..1.
+/// 8-bit sRGB from linear components (IEC 61966-2-1), which are clamped to 0..1.
 pub fn encode_srgb(linear: [f64; 3]) -> [u8; 3] {
     linear.map(|v| {
         let v = v.clamp(0.0, 1.0);

@@ -1,6 +1,6 @@
-//! The status of a draw: one word, as the shader writes it.
+//! Status of a draw: one word, as the shader writes it.
 
-/// What a draw took: the number of candidates up to and including the accepted one, 0 where none was accepted, and
+/// Status of a draw: the number of candidates up to and including the accepted one (0 where none was accepted), and
 /// whether scaling took the spectrum to 1 or above. One word, as the shader writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(transparent)]
@@ -13,7 +13,7 @@ impl DrawStatus {
         DrawStatus(attempts | if above_one { Self::ABOVE_ONE } else { 0 })
     }
 
-    /// No candidate was accepted within the attempts allowed; all quantities are 0.
+    /// Status of a draw without an accepted candidate within the attempts allowed; all quantities are 0.
     pub(crate) const FAILED: DrawStatus = DrawStatus(0);
 
     /// The number of candidates up to and including the accepted one; 0 where none was.
@@ -21,7 +21,8 @@ impl DrawStatus {
         self.0 & !Self::ABOVE_ONE
     }
 
-    /// Whether scaling to the target took a value of the spectrum to 1 or above (possible under [`Bounds::Base`]).
+    /// Whether scaling to the target took a value of the spectrum to 1 or above (possible under
+    /// [`Bounds::Base`](crate::Bounds::Base)).
     pub fn above_one(self) -> bool {
         self.0 & Self::ABOVE_ONE != 0
     }

@@ -1,4 +1,4 @@
-//! Wavelength grids, and how a measured spectrum is brought onto one.
+//! Wavelength grids, and the resampling of measured spectra onto them.
 //!
 //! Models live on uniform grids; measurements need not. Where a grid point is a measured point its value is taken as
 //! it stands; elsewhere a not-a-knot cubic spline interpolates, as the field's MATLAB tools do. Nothing is
@@ -27,22 +27,24 @@ pub struct Grid {
     len: usize,
 }
 
-/// Why something is not a uniform grid of wavelengths.
+/// Error returned where something is not a uniform grid of wavelengths.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum GridError {
     #[error("{0:?} is not a grid: write start:step:stop in nm, as in 400:10:700")]
     Syntax(String),
-    #[error("{0} is not a wavelength: every one must be finite and above 0 nm")]
+    #[error("{0} is not a wavelength: wavelengths in nm are finite and above 0")]
     NotAWavelength(f64),
-    #[error("a step of {0} nm does not increase the wavelength")]
+    #[error("a step of {0} nm does not increase the wavelength: it must be above 0")]
     Step(f64),
     #[error("the grid ends at {stop} nm, before it starts at {start} nm: write start:step:stop")]
     Reversed { start: f64, stop: f64 },
-    #[error("{stop} nm is not a whole number of steps of {step} nm from {start} nm")]
+    #[error(
+        "{stop} nm is not a whole number of steps of {step} nm from {start} nm: change the step or an end"
+    )]
     Uneven { start: f64, step: f64, stop: f64 },
-    #[error("a grid of {0} bands: it needs 1 to {MAX_BANDS}")]
+    #[error("a grid of {0} bands: it must have 1 to {MAX_BANDS}")]
     Count(usize),
     #[error("wavelengths must increase, but number {index} is {after} nm after {before} nm")]
     NotIncreasing { index: usize, before: f64, after: f64 },
@@ -51,10 +53,10 @@ pub enum GridError {
 }
 
 impl Grid {
-    /// The grid most of the field's data share, and the default here: 400 to 700 nm by 10 nm, 31 bands.
+    /// The grid that most of the field's data share, and the default here: 400 to 700 nm by 10 nm, 31 bands.
     pub const DEFAULT: Grid = Grid { start: 400.0, step: 10.0, len: 31 };
 
-    /// `len` wavelengths from `start` by `step`, both in nm.
+    /// Makes a grid of `len` wavelengths from `start` by `step`, both in nm.
     pub fn new(start: f64, step: f64, len: usize) -> Result<Grid, GridError> {
         if !(start.is_finite() && start > 0.0) {
             return Err(GridError::NotAWavelength(start));
@@ -68,7 +70,7 @@ impl Grid {
         Ok(Grid { start, step, len })
     }
 
-    /// The grid through evenly spaced wavelengths (nm), which may carry rounding errors of 10^-6 of a step.
+    /// Makes the grid through evenly spaced wavelengths (nm), which may carry rounding errors of 10^-6 of a step.
     pub fn from_wavelengths(wavelengths: &[f64]) -> Result<Grid, GridError> {
         check_increasing(wavelengths)?;
         let [start, .., stop] = *wavelengths else {
@@ -154,7 +156,7 @@ impl FromStr for Grid {
     }
 }
 
-/// Finite, positive and strictly increasing.
+/// Checks that wavelengths are finite, positive and strictly increasing.
 pub(crate) fn check_increasing(wavelengths: &[f64]) -> Result<(), GridError> {
     if let Some(&bad) = wavelengths.iter().find(|w| !(w.is_finite() && **w > 0.0)) {
         return Err(GridError::NotAWavelength(bad));
@@ -167,14 +169,14 @@ pub(crate) fn check_increasing(wavelengths: &[f64]) -> Result<(), GridError> {
     }
 }
 
-/// What a spectrum is outside the wavelengths at which it was measured.
+/// Treatment of wavelengths at which a spectrum was not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Extrapolation {
-    /// Unknown: asking for it is an error.
+    /// No value: asking for one is an error.
     #[default]
     Error,
-    /// What it is at the nearer end.
+    /// The value at the nearer end of the measurements.
     Hold,
     /// Zero.
     Zero,
@@ -188,7 +190,7 @@ pub(crate) struct Spline<'a> {
 }
 
 impl<'a> Spline<'a> {
-    /// `x` increases strictly and is as long as `y`; neither is empty.
+    /// Makes the spline: `x` increases strictly and is as long as `y`; neither is empty.
     pub(crate) fn new(x: &'a [f64], y: &'a [f64]) -> Self {
         Spline { x, y, slopes: slopes(x, y) }
     }
@@ -308,8 +310,8 @@ mod tests {
         assert!(x.iter().zip(&y).all(|(&x, &y)| spline.at(x, Extrapolation::Error) == y));
     }
 
-    /// scipy.interpolate.CubicSpline(x, y, bc_type="not-a-knot") at 1.5, 2.5 and 3.5, through the first 6, 4 and 3
-    /// points.
+    /// Values of scipy.interpolate.CubicSpline(x, y, bc_type="not-a-knot") at 1.5, 2.5 and 3.5, through the first 6,
+    /// 4 and 3 points.
     #[test]
     fn agrees_with_scipy() {
         let x = [1.0, 2.0, 4.0, 5.0, 5.5, 7.0];

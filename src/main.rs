@@ -9,7 +9,7 @@ fn main() -> ExitCode {
     cli::main()
 }
 
-/// Mesa's software driver complains on standard error where the variable is unset, as it is in containers.
+/// Silences Mesa's software driver, which complains on standard error where the variable is unset, as in containers.
 fn quiet_drivers() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
         // SAFETY: this is the first statement of the program, so no other thread reads the environment.

@@ -1,28 +1,30 @@
-//! What comes out of a draw, and how it lies in memory.
+//! Quantities of a draw, and their layout in memory.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Something that a draw can give. Each is an array of its own.
+/// Quantity that a draw can give, in an array of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum), value(rename_all = "snake_case"))]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// The spectrum: a value for each band, after scaling where there is a target or an intensity.
+    /// The spectrum: one value per band, after scaling where there is a target or an intensity.
     Spectra,
-    /// The weights of the model's components, k values, of the spectrum before scaling.
+    /// The k weights of the model's components, for the spectrum before scaling.
     Weights,
-    /// CIE 1931 tristimulus values, 3: of a reflectance under an illuminant, where a perfect white has Y = 1; of an
-    /// illuminant its own.
+    /// CIE 1931 tristimulus values X, Y, Z (2 degree observer): of a reflectance under an illuminant, where a perfect
+    /// white has Y = 1; of an illuminant its own.
     Xyz,
-    /// The same as linear Rec. 709 components, 3 (IEC 61966-2-1), unclamped.
+    /// Linear Rec. 709 components R, G, B (IEC 61966-2-1) of the tristimulus values, unclamped: outside the gamut
+    /// they are negative or above 1.
     LinearSrgb,
-    /// The luminous reflectance value of a reflectance under D65; the target where there is one.
+    /// The luminous reflectance (LRV) of a reflectance: CIE Y of the 1931 2 degree observer under D65, 1 for a
+    /// perfect white.
     Lrv,
-    /// A [`DrawStatus`](crate::DrawStatus): how many candidates the draw took.
+    /// The [`DrawStatus`](crate::DrawStatus), which has the number of candidates that the draw took.
     Attempts,
-    /// What an illuminant was multiplied by.
+    /// The factor that an illuminant was multiplied by.
     Intensity,
     /// CIE 1931 chromaticity x and y, of the tristimulus values, whatever their scale.
     Chromaticity,
@@ -47,7 +49,7 @@ impl Quantity {
     /// How many there are.
     pub(crate) const COUNT: usize = Quantity::ALL.len();
 
-    /// The name of the axis that its values run over within a draw, in files; `None` where a draw has one value.
+    /// Name of the axis of its values within a draw, in files; `None` where a draw has one value.
     pub fn axis(self) -> Option<&'static str> {
         match self {
             Quantity::Spectra => Some("wavelength"),
@@ -57,7 +59,7 @@ impl Quantity {
         }
     }
 
-    /// The names of its values, where each has one of its own.
+    /// Names of its values, where each has one of its own.
     pub fn channels(self) -> &'static [&'static str] {
         match self {
             Quantity::Xyz => &["X", "Y", "Z"],
@@ -67,7 +69,7 @@ impl Quantity {
         }
     }
 
-    /// Its name, as shaders, files and the command line have it.
+    /// Name in shaders, files and commands.
     pub fn name(self) -> &'static str {
         match self {
             Quantity::Spectra => "spectra",
@@ -88,21 +90,22 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// How the values of quantities that have several a draw are ordered.
+/// Order of the values of a quantity that has several per draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layout {
     /// (draw, value): draw by draw, without padding.
     #[default]
     Rows,
-    /// The same, with zeros up to a multiple of 4 values a draw, for shaders that read `vec4`s.
+    /// (draw, value), with zeros up to a multiple of 4 values a draw, for shaders that read `vec4`s.
     PaddedRows,
-    /// (value, draw): a plane for each value, which has a multiple of 4 draws; those beyond the last mean nothing.
+    /// (value, draw): a plane for each value, with room for a multiple of 4 draws; values beyond the last draw are
+    /// undefined.
     Planes,
 }
 
-/// What the values of spectra are between. 16 bits could round them to an end: they are rounded to the nearest that is
-/// none.
+/// Range of values that a spectrum may take. Where 16 bits would round a value to an end of it, it is rounded to the
+/// nearest number within.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ValueRange {
@@ -113,7 +116,7 @@ pub enum ValueRange {
 }
 
 impl ValueRange {
-    /// The least half-precision number in it, and the largest; infinity where there is none.
+    /// The smallest half-precision number within the range, and the largest; infinity where there is none.
     pub(crate) fn halves(self) -> [f32; 2] {
         match self {
             ValueRange::Positive => [2f32.powi(-24), f32::INFINITY],
@@ -122,7 +125,7 @@ impl ValueRange {
     }
 }
 
-/// The type of a value.
+/// Type of a value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Dtype {
@@ -136,7 +139,7 @@ pub enum Dtype {
     #[serde(rename = "float32")]
     #[cfg_attr(feature = "cli", value(name = "f32"))]
     F32,
-    /// IEEE double precision: of files, not of draws.
+    /// IEEE double precision: in files only, never in draws.
     #[serde(rename = "float64")]
     #[cfg_attr(feature = "cli", value(name = "f64"))]
     F64,
@@ -147,7 +150,7 @@ pub enum Dtype {
 }
 
 impl Dtype {
-    /// Its size in bytes.
+    /// Size in bytes.
     pub fn size(self) -> usize {
         match self {
             Dtype::F16 => 2,
@@ -156,7 +159,7 @@ impl Dtype {
         }
     }
 
-    /// What NumPy, Zarr and xarray call it.
+    /// Name in NumPy, Zarr and xarray.
     pub fn name(self) -> &'static str {
         match self {
             Dtype::F16 => "float16",
@@ -167,31 +170,31 @@ impl Dtype {
     }
 }
 
-/// How a quantity lies in its array.
+/// Layout of a quantity in its array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArrayFormat {
-    /// What it is.
+    /// The quantity.
     pub quantity: Quantity,
-    /// The type of its values.
+    /// Type of its values.
     pub dtype: Dtype,
-    /// How many a draw has, without padding.
+    /// Number of values per draw, without padding.
     pub width: usize,
-    /// How they are ordered.
+    /// Order of the values.
     pub layout: Layout,
 }
 
 impl ArrayFormat {
-    /// That of spectra unless asked otherwise.
+    /// Format of spectra unless a recipe asks for another.
     pub(crate) fn spectra(bands: usize) -> ArrayFormat {
         ArrayFormat { quantity: Quantity::Spectra, dtype: Dtype::F32, width: bands, layout: Layout::Rows }
     }
 
-    /// That of tallies.
+    /// Format of statuses.
     pub(crate) fn status() -> ArrayFormat {
         ArrayFormat { quantity: Quantity::Attempts, dtype: Dtype::U32, width: 1, layout: Layout::Rows }
     }
 
-    /// How many values there are from the start of one row to the start of the next. 1 in planes.
+    /// Number of values from the start of one row to the start of the next; 1 in planes.
     pub fn stride(&self) -> usize {
         match self.layout {
             Layout::Rows => self.width,
@@ -200,12 +203,12 @@ impl ArrayFormat {
         }
     }
 
-    /// How many planes there are; 1 in rows.
+    /// Number of planes; 1 in rows.
     pub fn planes(&self) -> usize {
         if self.layout == Layout::Planes { self.width } else { 1 }
     }
 
-    /// How many values the array of `draws` draws has, padding and all.
+    /// Number of values in the array of `draws` draws, with padding.
     pub fn values(&self, draws: u64) -> u64 {
         match self.layout {
             Layout::Rows | Layout::PaddedRows => draws * self.stride() as u64,
@@ -213,7 +216,7 @@ impl ArrayFormat {
         }
     }
 
-    /// How many bytes the array of `draws` draws has.
+    /// Number of bytes in the array of `draws` draws, with padding.
     pub fn bytes(&self, draws: u64) -> u64 {
         self.values(draws) * self.dtype.size() as u64
     }

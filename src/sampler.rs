@@ -1,4 +1,4 @@
-//! The compute shader of a recipe on a wgpu device, recorded into its host's command encoders. No code here submits,
+//! Compute pipeline of a recipe on a wgpu device, recorded into its host's command encoders. No code here submits,
 //! polls or asks for a device.
 
 use bytemuck::{Pod, Zeroable};
@@ -34,17 +34,17 @@ use crate::wgsl::{self, COVER_AT, Dialect, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT,
 #[derive(Clone, Debug)]
 pub struct Sampler {
     pipeline: wgpu::ComputePipeline,
-    /// The numbers that the shader reads from a buffer, where it does.
+    /// The tables that the shader reads from a buffer, if it has any.
     tables: Option<wgpu::Buffer>,
-    /// The boxes that candidates are proposed from, where they are.
+    /// The boxes from which candidates are drawn, if the recipe has a cover.
     cover: Option<wgpu::Buffer>,
-    /// What comes out.
+    /// Formats of the output arrays.
     formats: Vec<ArrayFormat>,
     max_attempts: u32,
     draws_per_thread: u32,
 }
 
-/// Why something cannot be drawn on a device, or not in one dispatch.
+/// Error returned where something cannot be drawn on a device, or not in one dispatch.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -64,7 +64,7 @@ pub enum SamplerError {
     NoRoom { count: u64, prepared: u64 },
 }
 
-/// What the shader reads as `Parameters`.
+/// Uniform that the shader declares as `Parameters`.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Parameters {
@@ -153,17 +153,17 @@ impl Sampler {
         }
     }
 
-    /// What comes out, in the order of [`Quantity`], and how it lies in its buffer.
+    /// Formats of the output arrays, in the order of [`Quantity`].
     pub fn formats(&self) -> &[ArrayFormat] {
         &self.formats
     }
 
-    /// The most draws that one dispatch can make under these limits.
+    /// Largest number of draws in one dispatch under these limits.
     pub fn max_count(&self, limits: &wgpu::Limits) -> u64 {
         self.limit(limits).0
     }
 
-    /// That, and the name of what limits it.
+    /// Largest number of draws in one dispatch, and the name of the limit that sets it.
     fn limit(&self, limits: &wgpu::Limits) -> (u64, &'static str) {
         // Four draws, for which padding comes to nothing.
         let four = self.formats.iter().map(|format| format.bytes(4)).max().expect("something comes out");
@@ -180,12 +180,12 @@ impl Sampler {
         .expect("there are limits")
     }
 
-    /// Buffers for `draws`, and all that records them.
+    /// Allocates buffers for `draws`, and prepares to record them.
     pub fn prepare(&self, device: &Device, draws: DrawRange) -> Result<Prepared, SamplerError> {
         self.prepare_for(device, draws, BufferUsages::COPY_SRC)
     }
 
-    /// The same, with buffers of another usage besides storage.
+    /// Prepares as [`Sampler::prepare`] does, with buffers of another usage besides storage.
     pub(crate) fn prepare_for(
         &self,
         device: &Device,
@@ -248,10 +248,10 @@ pub struct Prepared {
     sampler: Sampler,
     bindings: wgpu::BindGroup,
     parameters: wgpu::Buffer,
-    /// In the order of the sampler's formats.
+    /// Buffers, in the order of the sampler's formats.
     outputs: Vec<wgpu::Buffer>,
     count: u64,
-    /// How many draws there is room for.
+    /// Number of draws that the buffers have room for.
     prepared: u64,
 }
 
@@ -266,26 +266,27 @@ impl Prepared {
         pass.dispatch_workgroups((self.count as u32).div_ceil(draws_per_workgroup), 1, 1);
     }
 
-    /// The values of a quantity once the pass has run, as [`Prepared::formats`] says they lie; `None` if the recipe
-    /// does not ask for it. The buffer may be longer. A draw that failed, which [`Quantity::Attempts`] tells, is 0.
+    /// Buffer with the values of a quantity once the pass has run, in its format of [`Prepared::formats`]; `None` if
+    /// the recipe does not ask for it. The buffer may be longer. A draw that failed, as [`Quantity::Attempts`] tells,
+    /// is 0.
     pub fn buffer(&self, quantity: Quantity) -> Option<&wgpu::Buffer> {
         let position = self.formats().iter().position(|format| format.quantity == quantity)?;
         Some(&self.outputs[position])
     }
 
-    /// What comes out, and how it lies in the buffers. Planes are `count` draws apart, rounded up to a multiple of 4.
+    /// Formats of the arrays in the buffers. Planes are `count` draws apart, rounded up to a multiple of 4.
     pub fn formats(&self) -> &[ArrayFormat] {
         &self.sampler.formats
     }
 
-    /// The buffers, in the order of the formats.
+    /// Buffers, in the order of the formats.
     pub(crate) fn buffers(&self) -> &[wgpu::Buffer] {
         &self.outputs
     }
 
-    /// Goes on to other draws, at most as many as were prepared, in the same buffers: for a host that draws anew in each
-    /// frame. What is recorded already makes them too, from the queue's next submission on; two ranges in one submission
-    /// take two [`Sampler::prepare`].
+    /// Changes the range of draws, to at most as many as were prepared, in the same buffers: for a host that draws
+    /// anew in each frame. Passes that are recorded already draw it too, from the queue's next submission on; two
+    /// ranges in one submission take two [`Sampler::prepare`].
     ///
     /// ```
     /// use spectroll::{Model, Recipe, Sampler, Stream, wgpu};

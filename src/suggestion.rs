@@ -1,6 +1,6 @@
-//! What was probably meant by a name that is not known.
+//! Suggestions for names that are not known.
 
-/// The one of `known` that is nearest to `found`, if it is near enough to have been meant.
+/// Returns the one of `known` that is nearest to `found`, if it is near enough to have been meant.
 pub fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let found = found.to_ascii_lowercase();
     let distance = |name: &&str| strsim::osa_distance(&found, name);

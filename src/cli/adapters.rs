@@ -1,4 +1,4 @@
-//! `spectroll adapters`: what can be drawn on.
+//! `spectroll adapters`: a list of the adapters that can draw.
 
 use std::io::Write;
 

@@ -1,4 +1,4 @@
-//! `spectroll bench`: how fast this machine draws, and what each part of a draw costs.
+//! `spectroll bench`: the speed of drawing on this machine, and the cost of each part of a draw.
 //!
 //! In-process rates: values are computed and mapped for reading in order, and nothing is done with them. The median of
 //! several runs is what to quote; their spread tells how quiet the machine was.
@@ -16,10 +16,10 @@ use spectroll::{
 use super::options::EngineArguments;
 use super::{interrupt, model};
 
-/// How long one run should take, seconds.
+/// Duration of one run, seconds.
 const RUN: f64 = 0.4;
 
-/// The same where there are many recipes to measure.
+/// Duration of one run where there are many recipes to measure, seconds.
 const SHORT_RUN: f64 = 0.1;
 
 /// Measure how fast spectra are drawn, by every adapter and by the CPU
@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     /// Measure what each quantity, rule and size of model costs, of the built-in models
     #[arg(long, conflicts_with = "model")]
     costs: bool,
-    /// How many runs
+    /// Number of runs
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(5..))]
     runs: u32,
     /// Print the rates as JSON
@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
 #[derive(Default, Serialize)]
 struct Measured {
     rates: Vec<Rates>,
-    /// What each part of a draw costs, of each adapter.
+    /// Cost of each part of a draw, for each adapter.
     shares: Vec<Shares>,
 }
 
@@ -171,7 +171,7 @@ fn costs() -> anyhow::Result<Vec<(String, RecipeBuilder)>> {
     .into())
 }
 
-/// What each part of a draw costs; nothing where that is not known.
+/// Measures the cost of each part of a draw; `None` where it cannot be measured.
 fn parts(engine: &Engine, runs: u32) -> anyhow::Result<Option<Vec<Share>>> {
     let model = Model::builtin("munsell-vrhel")?;
     let Some(mut costs) = Costs::new(engine, &model, Duration::from_secs_f64(SHORT_RUN))? else {

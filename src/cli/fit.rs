@@ -23,16 +23,16 @@ pub(crate) struct Arguments {
     /// The number of components
     #[arg(short = 'k', long, default_value_t = 6, value_name = "K")]
     components: usize,
-    /// What the spectra are [default: what the name of the variable says: sur_X, spd_X, daylightX]
+    /// Kind of the spectra [default: as the name of the variable says: sur_X, spd_X, daylightX]
     #[arg(long, value_enum)]
     kind: Option<SpectrumKind>,
     /// The wavelengths, start:step:stop in nm [default: 400:10:700]
     #[arg(long, value_name = "GRID")]
     wavelengths: Option<Grid>,
-    /// What each spectrum is divided by first [default: mean for illuminants, none for reflectances]
+    /// Divide each spectrum by this first [default: mean for illuminants, none for reflectances]
     #[arg(long, value_enum)]
     normalize: Option<Normalization>,
-    /// What a spectrum is outside the wavelengths at which it was measured
+    /// Treat wavelengths outside a spectrum's measurements as
     #[arg(long, value_enum, default_value = "error")]
     extrapolate: Extrapolation,
     /// The model file
@@ -86,7 +86,7 @@ fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
     Ok(Table::open_on(Path::new(path), variable, grid)?)
 }
 
-/// What the spectra are: as said, else as their names say, if those agree.
+/// Kind of the spectra: as asked, else as their names say, if those agree.
 fn kind(arguments: &Arguments, tables: &[Table]) -> anyhow::Result<SpectrumKind> {
     if let Some(kind) = arguments.kind {
         return Ok(kind);

@@ -1,4 +1,4 @@
-//! `spectroll inspect`: what a model is, as a table and, where asked, as a picture.
+//! `spectroll inspect`: the contents of a model, as a table and, where asked, as a picture.
 //!
 //! A fit is judged by how much it explains, by how its weights spread and by how many of its draws are physical, so
 //! that is what the table holds. The picture is made first: a name that cannot be written is reported before anything
@@ -14,7 +14,7 @@ use super::options::RecipeArguments;
 use super::parse::grouped;
 use super::{if_exists, picture};
 
-/// Show what a model is: a table, and a picture where asked
+/// Show the contents of a model: a table, and a picture where asked
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// The model: a file, or the name of a built-in one
@@ -126,7 +126,7 @@ fn normalization(normalization: Normalization) -> &'static str {
     }
 }
 
-/// Where candidates come from, and what that costs.
+/// Describes the source of candidates, and its cost.
 fn candidates(recipe: &Recipe) -> String {
     let each = 1.0 / recipe.acceptance();
     match recipe.cover() {
@@ -180,7 +180,7 @@ fn peak(model: &Model, component: usize) -> f64 {
     model.grid().wavelength(model.parts().basis.row(component).transpose().iamax())
 }
 
-/// How a column of numbers is written, so that its points align.
+/// Notation of a column of numbers, so that their points align.
 #[derive(Clone, Copy)]
 enum Notation {
     Fixed,

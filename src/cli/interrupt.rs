@@ -11,12 +11,12 @@ use spectroll::export::{Destination, Output};
 #[error("interrupted; {0}")]
 pub(super) struct Interrupted(pub(super) String);
 
-/// Whether somebody asked for an end. Nothing until [`watch`].
+/// Set once somebody asked for an end. Empty until [`watch`].
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From here on Ctrl-C and the like are for [`check`] to see; before, they end the program. The end of its terminal
-/// stays ignored where whoever started it ignores that, as `nohup` does. (Shells ignore SIGINT for whatever scripts start
-/// with `&`, and mean nothing by it.)
+/// Catches Ctrl-C and the like from here on, for [`check`] to see; before, they end the program. The end of its
+/// terminal stays ignored where whoever started it ignores that, as `nohup` does. Shells ignore SIGINT for whatever
+/// scripts start with `&`, and mean nothing by it.
 pub(super) fn watch() {
     let flag = INTERRUPTED.get_or_init(Arc::default);
     let register = |signal| {

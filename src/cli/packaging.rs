@@ -1,4 +1,4 @@
-//! `spectroll completions` and `spectroll man`: what packagers install beside the program.
+//! `spectroll completions` and `spectroll man`: files that packagers install beside the program.
 
 use std::fs;
 use std::io::{self, Write};

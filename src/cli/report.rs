@@ -1,4 +1,4 @@
-//! `spectroll report`: what draws cost, how good they are and how they behave at the edges, as a page to keep.
+//! `spectroll report`: the cost of draws, their quality and extreme cases, as a page to keep.
 
 use std::cell::RefCell;
 use std::io::Write;
@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     anyhow::bail!("{}; {:?} has them all", failures(report.verdict()), arguments.output.join("report.html"))
 }
 
-/// What a verdict that is not good says is wrong.
+/// Describes what is wrong in a verdict that is not good.
 fn failures(Verdict { cases, checks, answers }: Verdict) -> String {
     let parts = [
         (cases, "stiff and extreme cases have a wrong answer"),

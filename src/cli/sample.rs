@@ -24,7 +24,7 @@ pub(crate) struct Arguments {
     /// A model file, or munsell-vrhel, granada, munsell-vrhel-5nm, granada-5nm
     #[arg(value_name = "MODEL")]
     model: String,
-    /// How many spectra (1000000 and 1e6 are the same)
+    /// Number of spectra (1000000 and 1e6 are the same)
     #[arg(short = 'n', long, value_name = "COUNT", value_parser = count, allow_negative_numbers = true)]
     count: u64,
     /// The seed of the random numbers
@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     quiet: bool,
 }
 
-/// What a run made and how, for people and programs.
+/// Result of a run, for people and programs.
 #[derive(Serialize)]
 struct Report {
     model: String,

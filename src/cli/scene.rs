@@ -66,7 +66,7 @@ pub(crate) struct Arguments {
     quiet: bool,
 }
 
-/// What a run made and how, for people and programs.
+/// Result of a run, for people and programs.
 #[derive(Serialize)]
 struct Report {
     scene: String,
@@ -282,7 +282,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// What drawing takes, before anything is drawn.
+    /// Describes the workload of drawing, before anything is drawn.
     fn workload(&self, engine: &Engine) -> Report {
         let mut workload = self.scene.workload(self.count());
         if engine.adapter().is_none() && workload.shaders > 0 {

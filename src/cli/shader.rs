@@ -1,11 +1,11 @@
-//! `spectroll shader`: the draw as WGSL functions, for shaders of others.
+//! `spectroll shader`: the draw as WGSL functions, for other people's shaders.
 
 use std::io::Write;
 
 use super::model;
 use super::options::RecipeArguments;
 
-/// Print the draw as WGSL functions, for a shader of your own
+/// Print WGSL functions that draw spectra, for a shader of your own
 ///
 /// The text has no bindings and no entry points, needs no optional feature, and starts every name with PREFIX_:
 /// PREFIX_draw(seed: vec2<u32>, index: vec2<u32>) makes the draw that `spectroll sample` makes, and PREFIX_at(draw,
@@ -18,7 +18,7 @@ pub(crate) struct Arguments {
     model: String,
     #[command(flatten)]
     request: RecipeArguments,
-    /// What every name starts with
+    /// Begin every name with this
     #[arg(long, default_value = "spectroll")]
     prefix: String,
     /// Start with the line that naga_oil imports the module by, as spectroll::PREFIX

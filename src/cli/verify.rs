@@ -1,4 +1,4 @@
-//! `spectroll verify` and `spectroll merge`: sets that were written before.
+//! `spectroll verify` and `spectroll merge`: checks and completion of sets that were written before.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ pub(crate) struct VerifyArguments {
     /// The share of the chunks that is drawn again and compared, 0 to 1
     #[arg(long, default_value_t = 0.01, value_name = "SHARE", value_parser = share)]
     redraw: f64,
-    /// Where the files are that a scene names [default: the folder that holds the set]
+    /// Folder of the files that a scene names [default: the folder that holds the set]
     #[arg(long, value_name = "FOLDER")]
     files: Option<PathBuf>,
     #[command(flatten)]
@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// So many of the chunks, at random, and at least one unless none is wanted.
+/// Chooses this share of the chunks, at random, and at least one unless none is wanted.
 fn chosen(chunks: &[u64], share: f64) -> BTreeSet<u64> {
     let wanted = ((chunks.len() as f64 * share).ceil() as usize).min(chunks.len());
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_nanos() as u64);
@@ -99,13 +99,13 @@ fn share(text: &str) -> Result<f64, String> {
     share.ok_or_else(|| "expected a share from 0 to 1".to_owned())
 }
 
-/// What a set was made from.
+/// Sources of a set.
 enum Made {
     Draws { recipe: Box<Recipe>, draws: DrawRange },
     Scenes { scene: Box<Scene>, first: u64 },
 }
 
-/// What a set says of itself.
+/// Attributes that a set records.
 struct Attributes<'a> {
     path: &'a Path,
     schema: &'a Schema,
@@ -125,7 +125,7 @@ impl Attributes<'_> {
 }
 
 impl Made {
-    /// What the set was made from, or why that is not at hand.
+    /// Reads the sources of the set; an error says which is missing.
     fn from(arguments: &VerifyArguments, audit: &SetAudit) -> anyhow::Result<Result<Made, String>> {
         let schema = &audit.plan().schema;
         let attributes = Attributes { path: &arguments.path, schema };
@@ -171,7 +171,7 @@ impl Made {
         Ok(Ok(Made::Scenes { scene: Box::new(scene), first: attributes.read("start")? }))
     }
 
-    /// What draws it again.
+    /// Prepares to draw the set again.
     fn source<'a>(&'a self, engine: &'a Engine, schema: &Schema) -> Result<Box<dyn Rows + 'a>, EngineError> {
         Ok(match self {
             Made::Draws { recipe, draws } => Box::new(DrawRows::new(recipe, engine, *draws)?),
@@ -196,7 +196,7 @@ impl Made {
         )
     }
 
-    /// How these chunks differ from what is drawn now, where they do, and what all rows share.
+    /// Lists the chunks that differ from what is drawn now, and the arrays that all rows share if they do.
     fn differences(
         &self,
         arguments: &VerifyArguments,

@@ -1,10 +1,10 @@
-//! A choice of one of many by one random word, with integer odds, so that every engine makes the same one.
+//! Choice of one of many by one random word, with integer odds, so that every engine chooses the same.
 //!
 //! Walker's alias method, by Vose's construction ("A linear algorithm for generating random numbers with a given
 //! distribution", 1991), on integers: the word's top bits choose a column, and the rest choose between the column and
 //! its alias. A choice is made with exactly `odds` in 2^32.
 
-/// The alias table of odds that sum to 2^32.
+/// Alias table of odds that sum to 2^32.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Alias {
     /// 2^bits columns; at least 2, since a shift by 32 bits is no shift.
@@ -12,7 +12,8 @@ pub(crate) struct Alias {
     pub(crate) columns: Vec<Column>,
 }
 
-/// Chooses itself where the rest of the word, shifted to the top, is below the threshold, and its alias elsewhere.
+/// Column of the table: chooses itself where the rest of the word, shifted to the top, is below the threshold, and
+/// its alias elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Column {
     pub(crate) threshold: u32,
@@ -41,7 +42,7 @@ impl Alias {
         Alias { bits, columns }
     }
 
-    /// What a word chooses.
+    /// Returns the number that a word chooses.
     #[inline(always)]
     pub(crate) fn choose(&self, word: u32) -> u32 {
         let column = word >> (32 - self.bits);
@@ -50,8 +51,8 @@ impl Alias {
     }
 }
 
-/// Odds that sum to 2^32, in proportion to weights: rounded up, so that nothing is left out, and what rounding adds
-/// to each, as a factor of at least 1. The last number is what a weight of 1 would have got.
+/// Returns odds that sum to 2^32, in proportion to weights: rounded up, so that nothing is left out, and the factor
+/// of at least 1 by which rounding raised each. The last number is the odds that a weight of 1 would have got.
 pub(super) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
     const WORDS: f64 = 4_294_967_296.0;
     let total: f64 = weights.iter().sum();
@@ -68,7 +69,7 @@ pub(super) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
 mod tests {
     use super::*;
 
-    /// How many of all words choose each.
+    /// Number of all words that choose each column.
     fn shares(alias: &Alias) -> Vec<u64> {
         let room = 1u64 << (32 - alias.bits);
         let mut shares = vec![0; alias.columns.len()];

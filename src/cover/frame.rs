@@ -1,4 +1,4 @@
-//! The coordinates in which boxes fit a polytope best.
+//! Coordinates in which boxes fit a polytope best.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -6,8 +6,8 @@ use super::half_space::HalfSpace;
 use super::simplex::Polytope;
 use crate::affine::Affine;
 
-/// How much the walls weigh beside the density: enough that the centre of a region with room in it stays clear of
-/// them, and little enough that it stays where the mass is.
+/// Weight of the walls relative to the density: enough that the centre of a wide region stays clear of them, and
+/// little enough that it stays where the mass is.
 const BARRIER: f64 = 0.1;
 
 /// A rotation of the standard normals, which leaves their distribution alone, and a centre within the region. It is
@@ -17,12 +17,12 @@ const BARRIER: f64 = 0.1;
 pub(crate) struct Frame {
     /// A column for each axis, k x k, orthogonal.
     pub(super) axes: DMatrix<f64>,
-    /// In the frame's coordinates.
+    /// The centre, in the frame's coordinates.
     pub(super) centre: DVector<f64>,
 }
 
 impl Frame {
-    /// The frame of the region that half-spaces leave, from a point within it.
+    /// Finds the frame of the region that half-spaces leave, from a point within it.
     pub(super) fn new(half_spaces: &[&HalfSpace], within: &[f64]) -> Frame {
         let mut z = DVector::from_column_slice(within);
         let normals: Vec<_> = half_spaces.iter().map(|h| DVector::from_column_slice(&h.normal)).collect();
@@ -54,7 +54,7 @@ impl Frame {
         Frame { centre: axes.tr_mul(&z), axes }
     }
 
-    /// What half-spaces accept, in the frame's coordinates.
+    /// The region that half-spaces accept, in the frame's coordinates.
     pub(super) fn polytope(&self, half_spaces: &[&HalfSpace]) -> Polytope {
         let turned = |h: &&HalfSpace| self.axes.tr_mul(&DVector::from_column_slice(&h.normal));
         Polytope {
@@ -64,7 +64,7 @@ impl Frame {
         }
     }
 
-    /// A map of the standard normals as one of the frame's coordinates relative to its centre.
+    /// Rewrites a map of the standard normals as one of the frame's coordinates relative to its centre.
     pub(crate) fn turned(&self, map: &Affine) -> Affine {
         let mut turned = map.clone();
         for (i, value) in turned.offset.iter_mut().enumerate() {

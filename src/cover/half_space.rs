@@ -1,15 +1,15 @@
 //! Bounds as half-spaces of the standard normals.
 
-/// How far from the mean a draw may lie, in standard deviations of each component.
+/// Largest accepted distance from the mean, in standard deviations of each component.
 pub(crate) const REACH: f64 = 13.0;
 
-/// One bound of one band: what is accepted has normal . z < room.
+/// One bound of one band: points with normal . z < room are accepted.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct HalfSpace {
     pub(crate) band: usize,
-    /// Of length 1, or 0 where no z changes what is bounded.
+    /// Normal of length 1, or 0 where the bounded value does not depend on z.
     pub(crate) normal: Vec<f64>,
-    /// In standard deviations, unless the normal is 0.
+    /// Distance of the bound from the mean in standard deviations, unless the normal is 0.
     pub(crate) room: f64,
 }
 
@@ -21,12 +21,12 @@ impl HalfSpace {
         HalfSpace { band, normal, room: room / length }
     }
 
-    /// Whether all points or none obey it.
+    /// Whether all points or none are accepted.
     pub(crate) fn is_constant(&self) -> bool {
         self.normal.iter().all(|&c| c == 0.0)
     }
 
-    /// Whether it cuts something off the points within [`REACH`].
+    /// Whether the half-space excludes any point within [`REACH`].
     pub(crate) fn cuts(&self) -> bool {
         let corner = REACH * (self.normal.len() as f64).sqrt();
         !self.is_constant() && self.room < corner + 1.0

@@ -1,12 +1,12 @@
-//! An axis of a box: how to draw a standard normal between two ends.
+//! An axis of a box: draws of a standard normal between two ends.
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// The least share of an exponential hat that the normal may fill; below it an axis is drawn by its quantiles. An
-/// axis as narrow as half a standard deviation fills this much, and there the quantiles' error is 1e-6 of its width.
+/// Smallest share of an exponential hat that the normal may fill; below it an axis is drawn by its quantiles. An axis
+/// as narrow as half a standard deviation fills this much, and there the quantiles' error is 1e-6 of its width.
 const EFFICIENT: f64 = 0.99;
 
-/// Intervals narrower than this have no digits to lose in the middle of theirs.
+/// Width below which a mass comes from the middle of its interval, since a difference of tails would lose digits.
 const NARROW: f64 = 1e-3;
 
 /// Probability that a standard normal lies in an interval, to a relative error of 1e-10.
@@ -21,17 +21,17 @@ pub(super) fn normal_mass(low: f64, high: f64) -> f64 {
     if middle > 0.0 { upper_tail(low) - upper_tail(high) } else { upper_tail(-high) - upper_tail(-low) }
 }
 
-/// How an axis is drawn.
+/// Method by which an axis is drawn, with its numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
     /// The four numbers of [`Real::truncated`](crate::Real::truncated).
     pub(super) numbers: [f64; 4],
-    /// The mass of what is drawn before its cost thins it: at least that of the normal.
+    /// Mass of the proposals before their costs thin them: at least that of the normal.
     pub(super) mass: f64,
 }
 
 impl Axis {
-    /// The interval from `low` to `high`, drawn relative to `centre`.
+    /// Chooses the method for the interval from `low` to `high`, drawn relative to `centre`.
     pub(super) fn new(low: f64, high: f64, centre: f64) -> Axis {
         let (mass, hat) = (normal_mass(low, high), Hat::new(low, high));
         if mass < EFFICIENT * hat.mass {
@@ -44,16 +44,16 @@ impl Axis {
     }
 }
 
-/// An exponential above the normal density of an interval, exp(slope^2 / 2 - slope y) / sqrt(2 pi), which touches it
-/// at y = slope.
+/// Exponential above the normal density of an interval, exp(slope^2 / 2 - slope y) / sqrt(2 pi), which touches it at
+/// y = slope.
 struct Hat {
     slope: f64,
     mass: f64,
 }
 
 impl Hat {
-    /// That of the least mass. Its logarithm is convex in the slope, with the derivative slope - mean(y), so the
-    /// best slope is the mean of what is drawn, and within the interval.
+    /// Finds the hat of least mass. Its logarithm is convex in the slope, with the derivative slope - mean(y), so the
+    /// best slope is the mean of the proposals, and within the interval.
     fn new(low: f64, high: f64) -> Hat {
         let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
         let mut slope = middle;

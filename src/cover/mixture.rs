@@ -6,20 +6,20 @@ use super::alias::Alias;
 use crate::random::real::Real;
 use crate::random::stream::Blocks;
 
-/// The boxes, as a draw uses them.
+/// Boxes of a cover, with the numbers that a draw uses.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BoxMixture<R> {
     pub(crate) alias: Alias,
-    /// What a candidate of each box costs before any axis is drawn.
+    /// Cost of a candidate of each box before any axis is drawn.
     pub(super) costs: Vec<R>,
     /// The axes of each box.
     pub(super) axes: Vec<[R; 4]>,
-    /// The axes of a box, k.
+    /// Number of axes of a box, k.
     pub(crate) components: usize,
 }
 
 impl BoxMixture<f64> {
-    /// Rounds it.
+    /// Rounds all numbers to the type R.
     pub(crate) fn rounded<R: Real>(&self) -> BoxMixture<R> {
         BoxMixture {
             alias: self.alias.clone(),
@@ -31,8 +31,8 @@ impl BoxMixture<f64> {
 }
 
 impl BoxMixture<f32> {
-    /// What `shaders/cover.wgsl` reads: for each column of the alias table k + 1 vectors of four words. The first
-    /// has the column's threshold, its alias, and the cost of the box of its number; the others are the axes of
+    /// Words that `shaders/cover.wgsl` reads: for each column of the alias table k + 1 vectors of four words. The
+    /// first has the column's threshold, its alias, and the cost of the box of its number; the others are the axes of
     /// that box. Columns beyond the boxes have axes that nothing reads.
     pub(crate) fn words(&self) -> Vec<[u32; 4]> {
         let mut words = Vec::with_capacity(self.alias.columns.len() * (self.components + 1));
@@ -47,18 +47,18 @@ impl BoxMixture<f32> {
 }
 
 impl<R: Real> BoxMixture<R> {
-    /// How many bytes the words of it have, as [`words`](Proposal::words) gives them.
+    /// Number of bytes of the [`words`](BoxMixture::words).
     pub(crate) fn bytes(&self) -> usize {
         16 * self.alias.columns.len() * (self.components + 1)
     }
 
-    /// How many blocks of words a candidate takes.
+    /// Number of blocks of random words that a candidate takes.
     pub(crate) fn blocks(&self) -> u32 {
         (self.components as u32 + 2).div_ceil(4)
     }
 
-    /// Proposes a candidate in each of L lanes, of the words of `from`: `coordinates` are those of the
-    /// frame relative to its centre, k of them, and what is returned is whether thinning keeps them.
+    /// Proposes a candidate in each of L lanes, from the words of `from`: `coordinates` receives its k coordinates in
+    /// the frame, relative to its centre; the result is whether thinning keeps it.
     #[inline(always)]
     pub(crate) fn propose<const L: usize>(
         &self,
@@ -96,8 +96,8 @@ impl<R: Real> BoxMixture<R> {
         kept
     }
 
-    /// The numbers of an axis, number by number. Not inlined: the compiler would make vectors of the four numbers
-    /// rather than of the lanes, in all that follows.
+    /// The numbers of an axis, number by number, in lanes. Not inlined: the compiler would make vectors of the four
+    /// numbers rather than of the lanes, in all that follows.
     #[inline(never)]
     fn axes_in_lanes<const L: usize>(&self, boxes: &[usize; L], axis: usize) -> [[R; L]; 4] {
         let mut numbers = [[R::ZERO; L]; 4];

@@ -1,12 +1,11 @@
 //! Exact draws of regions that hold next to none of the candidates.
 //!
-//! What a rule accepts is a polytope in the standard normals z. Where its probability p is small, plain rejection
+//! The accepted points form a polytope in the standard normals z. Where its probability p is small, plain rejection
 //! costs 1 / p candidates a draw. A cover proposes better ones: disjoint boxes that hold the whole polytope, in
 //! coordinates that suit it ([`Frame`]); one of them chosen by its probability ([`Alias`]), and in it a normal for
-//! each axis, truncated to the box ([`crate::random::truncated`]). What the rule then accepts is distributed exactly as the
-//! accepted candidates of plain rejection are: both are the standard normal density on the polytope. Only the odds
-//! change, to p / (the probability of the boxes), a tenth or more for any p. Points beyond
-//! [`REACH`] are left out.
+//! each axis, truncated to the box ([`crate::random::truncated`]). Its accepted candidates are distributed exactly as
+//! those of plain rejection: both have the standard normal density on the polytope. Only the acceptance changes, to
+//! p / (the probability of the boxes), a tenth or more for any p. Points beyond [`REACH`] are left out.
 //!
 //! The half-spaces are open and the boxes closed, but faces have no probability; what a box loses or gains by
 //! rounding to f32 is 1e-7 of it. A draw's physical test is the same as without a cover, on the same f32 spectrum.
@@ -35,31 +34,31 @@ pub(crate) use mixture::BoxMixture;
 #[cfg(test)]
 use crate::random::stream::Stream;
 
-/// The most boxes of a cover. Twice as many would accept a tenth more, of a table twice the size.
+/// Largest number of boxes of a cover. Twice as many would accept a tenth more, from a table twice the size.
 const BOXES: usize = 1024;
 
-/// The most components for which a cover is built. The time grows from 0.1 s for 6 to 0.3 s for 8 and 2 s for 12, and
-/// the acceptance falls: boxes fit a polytope worse the more corners they have.
+/// Largest number of components for which a cover is built. The time grows from 0.1 s for 6 to 0.3 s for 8 and 2 s
+/// for 12, and the acceptance falls: boxes fit a polytope worse the more corners they have.
 pub(crate) const MOST_COMPONENTS: usize = 12;
 
-/// What making and judging a candidate of a cover costs, where one of plain rejection costs 1: 135 ns beside 69 ns on
-/// the CPU, for 6 components and 31 bands.
+/// Cost of a cover's candidate relative to one of plain rejection: 135 ns and 69 ns on the CPU, for 6 components and
+/// 31 bands.
 const COST: f64 = 2.0;
 
-/// Disjoint boxes that hold all that half-spaces accept.
+/// Disjoint boxes that together hold all that half-spaces accept.
 #[derive(Clone, Debug)]
 pub(crate) struct Cover {
     frame: Frame,
-    /// What is accepted, in the frame's coordinates relative to its centre.
+    /// The accepted region, in the frame's coordinates relative to its centre.
     #[cfg(test)]
     polytope: Polytope,
     boxes: Vec<Sides>,
     proposal: BoxMixture<f64>,
-    /// The mass of what is proposed, of which the region's is a share: the acceptance.
+    /// Probability mass of all proposals; the accepted region's share of it is the acceptance.
     mass: f64,
 }
 
-/// What candidates tell of a region.
+/// Estimate of a region's probability from candidates.
 #[cfg(test)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Estimate {
@@ -72,18 +71,18 @@ pub(crate) struct Estimate {
 }
 
 impl Cover {
-    /// The cover of what half-spaces accept, from a point within. `None` where it would be empty, or there are more
-    /// than [`MOST_COMPONENTS`].
+    /// Builds the cover of the region that half-spaces accept, from a point within. `None` where it would be empty,
+    /// or there are more than [`MOST_COMPONENTS`].
     pub(crate) fn new(half_spaces: &[HalfSpace], within: &[f64]) -> Option<Cover> {
         (within.len() <= MOST_COMPONENTS).then(|| Cover::of_boxes(half_spaces, within, BOXES)).flatten()
     }
 
-    /// Whether a cover could be cheaper than plain rejection that accepts this share of its candidates.
+    /// Whether a cover could be cheaper than plain rejection with the acceptance `plain`.
     pub(crate) fn could_pay(plain: f64) -> bool {
         plain < 1.0 / COST
     }
 
-    /// Whether this one is: from what it accepts, and what plain rejection does.
+    /// Whether a cover with this acceptance is cheaper than plain rejection with the acceptance `plain`.
     pub(crate) fn pays(acceptance: f64, plain: f64) -> bool {
         acceptance > COST * plain
     }
@@ -121,17 +120,17 @@ impl Cover {
         &self.frame
     }
 
-    /// What proposes candidates.
+    /// The boxes that candidates are drawn from.
     pub(crate) fn proposal(&self) -> &BoxMixture<f64> {
         &self.proposal
     }
 
-    /// How many boxes it has.
+    /// Number of boxes.
     pub(crate) fn len(&self) -> usize {
         self.boxes.len()
     }
 
-    /// The probability of the boxes, with their hats, of which the region's is the share that is accepted.
+    /// Probability of the boxes, with their hats; the region's share of it is the acceptance.
     pub(crate) fn mass(&self) -> f64 {
         self.mass
     }

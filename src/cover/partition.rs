@@ -6,12 +6,12 @@ use super::half_space::REACH;
 use super::hat::normal_mass;
 use super::simplex::{Polytope, Reach, Sides, Simplex};
 
-/// Every side lies this far outside what it bounds, for rounding.
+/// Distance by which every side lies outside what it bounds, for rounding.
 const PADDING: f64 = 1e-11;
 
-/// The boxes, at most `most`, that hold every point of a polytope within [`REACH`] in each coordinate. The box of the
-/// largest probability is split, again and again, and what is left of each half is shrunk to the polytope. Boxes
-/// that lie within the polytope are not split. None where the polytope is empty.
+/// Divides a polytope into boxes, at most `most`, that hold every point of it within [`REACH`] in each coordinate.
+/// The box of the largest probability is split, again and again, and what is left of each half is shrunk to the
+/// polytope. Boxes that lie within the polytope are not split. No boxes where the polytope is empty.
 pub(super) fn partition(polytope: &Polytope, most: usize) -> Vec<Sides> {
     let mut cutter = Cutter::new(polytope);
     let (mut heap, mut within) = (BinaryHeap::new(), Vec::new());
@@ -40,7 +40,7 @@ pub(super) fn partition(polytope: &Polytope, most: usize) -> Vec<Sides> {
     within
 }
 
-/// A box, and what tightening its halves can start from.
+/// A box, with the starting points for tightening its halves.
 #[derive(Clone, Debug)]
 struct Node {
     sides: Sides,
@@ -48,7 +48,7 @@ struct Node {
     masses: Vec<f64>,
     /// The rows of the polytope that cut the box.
     rows: Vec<u32>,
-    /// How the reach along each direction was found.
+    /// Basis and farthest point of the last program along each direction.
     ends: Vec<End>,
 }
 
@@ -85,7 +85,7 @@ impl PartialOrd for Node {
     }
 }
 
-/// By probability.
+/// Orders nodes by probability.
 impl Ord for Node {
     fn cmp(&self, other: &Node) -> std::cmp::Ordering {
         self.mass().total_cmp(&other.mass())
@@ -136,7 +136,7 @@ impl<'a> Cutter<'a> {
         walls
     }
 
-    /// What is left of the halves of a box that is halved across the axis where least is left.
+    /// Splits a box across the axis on which its two tightened halves keep the least.
     fn split(&mut self, node: &Node) -> Vec<Node> {
         let mut best = (f64::INFINITY, Vec::new());
         for axis in 0..self.polytope.dimensions {
@@ -164,8 +164,8 @@ impl<'a> Cutter<'a> {
         self.tightened(half)
     }
 
-    /// The node with each of its sides moved in as far as the polytope lets it. A farthest point that is still in the
-    /// box is still the farthest. `None` where nothing is left.
+    /// Moves each side of a node in as far as the polytope lets it. A farthest point that is still in the box is
+    /// still the farthest. `None` where nothing is left.
     fn tightened(&mut self, mut node: Node) -> Option<Node> {
         for (i, end) in node.ends.iter_mut().enumerate() {
             if end.point.as_ref().is_some_and(|point| node.sides.contains(point)) {

@@ -1,4 +1,4 @@
-//! How far a polytope reaches within a box: small linear programs by the tens of thousands.
+//! Reach of a polytope within a box along a direction: small linear programs by the tens of thousands.
 //!
 //! A cover asks for the sides of tens of thousands of boxes, each of which differs from the one before in one or two
 //! bounds. That keeps a basis dual feasible, so a dual simplex method goes on from it, and needs a few steps and a
@@ -7,20 +7,20 @@
 //! multipliers bound the maximum from above (weak duality), and what they leave of the objective is bounded over the
 //! box. A limit on the steps, a perturbed objective, or rounding makes a bound loose and never wrong.
 
-/// Violations up to this are rounding.
+/// Largest violation that counts as rounding.
 const FEASIBLE: f64 = 1e-12;
 
-/// A violation must exceed this, where nothing can be exchanged, before a polytope is said to be empty.
+/// Smallest violation, where nothing can be exchanged, that makes a polytope count as empty.
 const EMPTY: f64 = 1e-9;
 
-/// The least element that a basis is changed on.
+/// Smallest element that a basis is changed on.
 const PIVOT: f64 = 1e-12;
 
-/// How much is added to each element of an objective, and a fraction more. Along an axis all multipliers but one
-/// would be 0, and steps that gain nothing would go round in circles.
+/// Amount added to each element of an objective, and a fraction more. Along an axis all multipliers but one would be
+/// 0, and steps that gain nothing would go round in circles.
 const PERTURBATION: f64 = 1e-9;
 
-/// The most steps of a program: many times what any has been seen to take, so only cycles end here.
+/// Largest number of steps of a program: many times what any has been seen to take, so only cycles end here.
 const STEPS: usize = 200;
 
 /// The points y with normal . y <= room for each of m rows, in k dimensions.
@@ -28,7 +28,7 @@ const STEPS: usize = 200;
 pub(super) struct Polytope {
     /// m rows of k values, of length 1.
     pub(super) normals: Vec<f64>,
-    /// m values.
+    /// Signed distances of the m bounds from the origin.
     pub(super) rooms: Vec<f64>,
     pub(super) dimensions: usize,
 }
@@ -38,7 +38,7 @@ impl Polytope {
         &self.normals[row * self.dimensions..(row + 1) * self.dimensions]
     }
 
-    /// The same with `centre` as the origin.
+    /// Moves the origin to `centre`.
     #[cfg(test)]
     pub(super) fn around(mut self, centre: &[f64]) -> Polytope {
         for row in 0..self.rooms.len() {
@@ -70,31 +70,31 @@ impl Sides {
     }
 }
 
-/// Where a program ended.
+/// Result of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Reach {
-    /// The farthest point is found: the objective there.
+    /// The objective at the farthest point, which was found.
     Attained(f64),
-    /// Nothing is farther than this.
+    /// An upper bound on the objective.
     Bounded(f64),
     /// No point is in both the polytope and the box.
     Empty,
 }
 
-/// The working memory of a program. Constraints are numbered: the polytope's rows, then for each axis the box's low
-/// side and its high side.
+/// Working memory of a program. Constraints are numbered: the polytope's rows, then for each axis the box's low side
+/// and its high side.
 pub(super) struct Simplex<'a> {
     polytope: &'a Polytope,
-    /// Perturbed.
+    /// The objective, perturbed.
     objective: Vec<f64>,
     /// The inverse of the basis. Its constraints are b . y <= h, and b of one with a row of this is 1 for its own row
     /// and 0 for the others.
     inverse: Vec<f64>,
-    /// Where all constraints of the basis are tight.
+    /// Point at which all constraints of the basis are tight.
     point: Vec<f64>,
-    /// What the objective gains by each constraint of the basis.
+    /// Gain of the objective by each constraint of the basis.
     multipliers: Vec<f64>,
-    /// The entering constraint: itself, and in terms of the basis.
+    /// Normal of the entering constraint, followed by its elements in terms of the basis.
     normal: Vec<f64>,
     column: Vec<f64>,
 }
@@ -116,8 +116,8 @@ impl<'a> Simplex<'a> {
         &self.point
     }
 
-    /// How far the polytope reaches along an objective, a vector, within a box. Starts from a dual feasible basis,
-    /// and leaves the last one in its place. Rows that are not in `rows` must not cut the box.
+    /// Finds how far the polytope reaches along an objective, a vector, within a box. Starts from a dual feasible
+    /// basis, and leaves the last one in its place. Rows that are not in `rows` must not cut the box.
     pub(super) fn reach(
         &mut self,
         rows: &[u32],
@@ -184,8 +184,8 @@ impl<'a> Simplex<'a> {
         }
     }
 
-    /// Inverts a basis, whose order it changes: sides of the box go where their axis is, which inverts them, and rows
-    /// of the polytope are exchanged for what is left. False where the basis is singular.
+    /// Inverts a basis, whose order it changes: sides of the box go to the place of their axis, which inverts them,
+    /// and rows of the polytope are exchanged for what is left. False where the basis is singular.
     fn invert(&mut self, basis: &mut [u32]) -> bool {
         const FREE: u32 = u32::MAX;
         let k = self.polytope.dimensions;
@@ -278,9 +278,9 @@ impl<'a> Simplex<'a> {
         most
     }
 
-    /// What the entering constraint, `normal`, takes the place of. Of those that keep the multipliers from falling
-    /// below 0, by more than rounding, the one with the largest element (Harris's test). `None` where the entering
-    /// constraint contradicts the basis.
+    /// Finds the constraint whose place the entering constraint, `normal`, takes. Of those that keep the multipliers
+    /// from falling below 0, by more than rounding, it is the one with the largest element (Harris's test). `None`
+    /// where the entering constraint contradicts the basis.
     fn leaving(&mut self) -> Option<usize> {
         const ROUNDING: f64 = 1e-13;
         self.express();
@@ -291,7 +291,7 @@ impl<'a> Simplex<'a> {
         candidates.max_by(|&i, &j| self.column[i].total_cmp(&self.column[j]))
     }
 
-    /// What the objective, unperturbed, exceeds at no point of the box and the polytope.
+    /// Upper bound on the unperturbed objective over the box and the polytope.
     fn bound(&mut self, sides: &Sides, basis: &[u32], objective: &[f64]) -> f64 {
         let k = self.polytope.dimensions;
         let mut bound = 0.0;
@@ -317,7 +317,7 @@ mod tests {
     use super::*;
     use crate::random::stream::Stream;
 
-    /// What microlp finds: `None` where there is no point.
+    /// The result of microlp: `None` where there is no point.
     fn by_microlp(polytope: &Polytope, sides: &Sides, objective: &[f64]) -> Option<f64> {
         let mut problem = Problem::new(OptimizationDirection::Maximize);
         let ends = sides.low.iter().copied().zip(sides.high.iter().copied());

@@ -1,4 +1,4 @@
-//! Covers of the regions that rules make, against plain rejection, against a Markov chain, and with faults.
+//! Covers of the regions that recipes accept, against plain rejection, against a Markov chain, and with faults.
 
 use std::sync::LazyLock;
 
@@ -12,7 +12,7 @@ use crate::random::real::Real;
 use crate::random::stream::StreamRng;
 use rand::Rng;
 
-/// The probability of a false alarm, in each of some 50 comparisons.
+/// Probability of a false alarm, in each of some 50 comparisons.
 const ALARM: f64 = 1e-8;
 
 static SURFACES: LazyLock<Model> = LazyLock::new(|| Model::builtin("munsell-vrhel").unwrap());
@@ -44,7 +44,7 @@ fn in_frame(program: &Program, cover: &Cover) -> Program {
 }
 
 /// The extreme regions, their covers' least acceptance, and their probabilities from other methods (plain rejection,
-/// another cover and an exponential tilt of the whole, which agree to 1e-4 where they can reach).
+/// another cover and an exponential tilt of the whole, which agree to 1e-4 within their range).
 const REGIONS: [(Option<f64>, f64, f64, f64); 9] = [
     (Some(0.95), 1.0, 0.27, 8.74e-3),
     (Some(0.98), 1.0, 0.18, 9.45e-5),
@@ -77,7 +77,7 @@ fn probabilities_are_those_of_other_methods() {
     }
 }
 
-/// Whether the spectrum of a point obeys the rule, in either arithmetic, as src/cpu computes it.
+/// Whether the spectrum of a point is accepted, in either arithmetic, as src/cpu computes it.
 fn is_physical<R: Real>(program: &Program, z: &[R]) -> bool {
     let spectrum: Vec<R> = (0..program.bands())
         .map(|b| {
@@ -94,7 +94,7 @@ fn is_physical<R: Real>(program: &Program, z: &[R]) -> bool {
     spectrum.iter().all(|&s| s * factor > R::ZERO && s * factor < R::ONE)
 }
 
-/// Candidates of the same words in both arithmetics: how many f32 judges otherwise, of how many.
+/// Judges candidates of the same words in both arithmetics; returns the number that f32 judges otherwise, and of all.
 fn flips(program: &Program, cover: &Cover, count: u64) -> u64 {
     let program = in_frame(program, cover);
     let (exact, rounded) = (cover.proposal(), cover.proposal().rounded::<f32>());
@@ -109,7 +109,7 @@ fn flips(program: &Program, cover: &Cover, count: u64) -> u64 {
     flipped.count() as u64
 }
 
-/// What f32 judges is the spectrum as it comes out, relative to the centre, so thin regions fare no worse than
+/// The spectrum that f32 judges is the one returned, relative to the centre, so thin regions fare no worse than
 /// others.
 #[test]
 fn single_precision_judges_as_double_does() {
@@ -135,7 +135,7 @@ fn accepted(cover: &Cover, proposal: &BoxMixture<f64>, candidates: u64) -> Point
     points.collect()
 }
 
-/// What plain rejection accepts, in the coordinates of the cover.
+/// The points that plain rejection accepts, in the coordinates of the cover.
 fn plain(cover: &Cover, candidates: u64) -> Points {
     let points = (0..candidates).filter_map(|i| {
         let words = [0, 1].map(|block| Stream::new(5).block(i, 0, block)).concat();
@@ -188,7 +188,7 @@ fn chain(cover: &Cover, points: usize, thinning: usize) -> Points {
     chain
 }
 
-/// The least probability of Kolmogorov and Smirnov's test, over the coordinates and the distance from the mean.
+/// Smallest probability by the Kolmogorov-Smirnov test, over the coordinates and the distance from the mean.
 fn agreement(cover: &Cover, a: &Points, b: &Points) -> f64 {
     let distance =
         |point: &Vec<f64>| point.iter().zip(&cover.frame.centre).map(|(d, c)| (d + c).powi(2)).sum::<f64>();
@@ -260,7 +260,7 @@ fn a_cover_draws_what_a_markov_chain_draws() {
     }
 }
 
-/// How many boxes a point is in.
+/// Number of boxes that a point is in.
 fn boxes_around(cover: &Cover, point: &[f64]) -> usize {
     let y: Vec<f64> = point.iter().zip(&cover.frame.centre).map(|(d, c)| d + c).collect();
     cover.boxes.iter().filter(|sides| sides.contains(&y)).count()

@@ -1,4 +1,4 @@
-//! The arrays that draws go into, a column for each output, and the loop over all cores that fills them.
+//! Arrays that draws go into, a column for each output, and the loop over all cores that fills them.
 
 use bytemuck::cast_slice_mut;
 use half::f16;
@@ -12,20 +12,20 @@ use crate::draw_status::DrawStatus;
 use crate::quantity::{ArrayFormat, Dtype, Layout, ValueRange};
 use crate::random::stream::DrawRange;
 
-/// How many lanes the f32 engine has: a vector register of AVX-512, two of AVX2.
+/// Number of lanes of the f32 engine: a vector register of AVX-512, two of AVX2.
 const LANES: usize = 16;
 
-/// How many draws a core takes at once, at most: enough that lanes which idle at the end do not count.
+/// Largest number of draws that a core takes at once: enough that lanes which idle at the end do not count.
 const CHUNK: usize = 4096;
 
 /// The part of an array that some consecutive draws go into.
 struct Column<'a> {
     format: ArrayFormat,
-    /// That of each plane; of rows there is one. Words of 32 bits, whatever the values are.
+    /// Words of 32 bits of each plane, whatever the values are; rows are one plane.
     planes: Vec<&'a mut [u32]>,
 }
 
-/// Makes all of `draws` in f32, in order, on all cores. Each array has the words of one output, and is as long as
+/// Draws a range in f32, in order, on all cores. Each array has the words of one output, and is as long as
 /// [`ArrayFormat::bytes`] says. Padding is left as it is.
 pub(crate) fn fill(kernel: &Kernel<f32>, draws: DrawRange, arrays: &mut [&mut [u32]]) {
     let count = draws.count as usize;
@@ -77,7 +77,8 @@ fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: DrawRange, columns
 struct Filling<'a> {
     kernel: &'a Kernel<f32>,
     columns: Vec<Column<'a>>,
-    /// Room for a row that is not stored as it is, in whole eights: there are instructions that round eight at once.
+    /// Row for values that are not stored as they are, in whole eights: there are instructions that round eight at
+    /// once.
     row: Vec<f32>,
     halves: Vec<f16>,
 }
@@ -125,7 +126,7 @@ impl Column<'_> {
         }
     }
 
-    /// The same in 16 bits, kept in an interval.
+    /// Stores values as [`Filling::put`] does, in 16 bits, kept in an interval.
     fn put_halves<const L: usize>(
         &mut self,
         values: &[[f32; L]],
@@ -272,7 +273,7 @@ mod tests {
         }
     }
 
-    /// What is in the arrays is what `Kernel::draw` gives, where the format says it lies.
+    /// The arrays hold what `Kernel::draw` gives, where the format says it lies.
     #[test]
     fn values_lie_where_their_format_says() {
         for recipe in recipes() {

@@ -1,4 +1,4 @@
-//! The intensity of an illuminant, of one uniform word of its draw.
+//! Intensity of an illuminant, from one uniform word of its draw.
 
 use crate::program::IntensityLaw;
 use crate::random::real::Real;

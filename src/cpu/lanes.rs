@@ -1,4 +1,4 @@
-//! Which draw each lane works on, and which draws are done.
+//! Lanes: the draw that each works on, and the draws that are done.
 
 use super::Verdicts;
 use crate::draw_status::DrawStatus;
@@ -21,11 +21,11 @@ pub(super) struct Lanes<const L: usize> {
     numbers: [u64; L],
     /// Its index, low words and high ones.
     index: [[u32; L]; 2],
-    /// How many candidates were made for it.
+    /// Number of candidates made for it.
     attempts: [u32; L],
     /// The number of the first draw that no lane has taken.
     next: u64,
-    /// Which lanes have a draw, as bits. One that has none goes on with one beyond the last, to no effect.
+    /// Lanes that have a draw, as bits. The others go on with one beyond the last, to no effect.
     busy: u64,
     done: [Done; L],
 }
@@ -54,7 +54,7 @@ impl<const L: usize> Lanes<L> {
         self.busy != 0
     }
 
-    /// Where the words of the next candidates come from.
+    /// Source of the words of the next candidates.
     #[inline(always)]
     pub(super) fn words(&self) -> Attempts<L> {
         Attempts { stream: self.draws.stream, index: self.index, attempts: self.attempts }

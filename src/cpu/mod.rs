@@ -38,17 +38,17 @@ pub(crate) struct Kernel<R> {
     /// Whether a word of a draw's own has a part in it.
     reads_draw_block: bool,
     proposal: Option<BoxMixture<R>>,
-    /// What a physical value is below, before scaling.
+    /// Upper limit of a physical value before scaling.
     limit: R,
     tests_scaled: bool,
     may_exceed_one: bool,
     max_attempts: u32,
-    /// What the values of spectra are between.
+    /// Range of values that spectra may take.
     range: ValueRange,
     outputs: Vec<Output<R>>,
 }
 
-/// An [`Affine`] map of the normals, by four values: so many sums at once keep a core busy, and share what is read of
+/// An [`Affine`] map of the normals, by four values: four sums at once keep a core busy, and share what is read of
 /// the normals. The last value fills the last four up, so that it is no special case.
 struct Map<R> {
     offset: Vec<[R; 4]>,
@@ -81,7 +81,7 @@ enum Unit<R> {
 /// The candidates that are being made, a lane each.
 struct Candidates<R, const L: usize> {
     normals: Vec<[R; L]>,
-    /// Before it is multiplied by the scale.
+    /// The spectrum before it is multiplied by the scale.
     spectrum: Vec<[R; L]>,
     scale: [R; L],
     /// The targets of their draws; 0 where there are none.
@@ -90,14 +90,14 @@ struct Candidates<R, const L: usize> {
     maps: Vec<Mapped<R, L>>,
 }
 
-/// The values of a map, and what they are to be multiplied by.
+/// Values of a map, and the factor to multiply them by.
 struct Mapped<R, const L: usize> {
     values: Vec<[R; L]>,
     unit: [R; L],
 }
 
 impl<R: Real, const L: usize> Candidates<R, L> {
-    /// The values of output `number`, without a tally's, and what each is to be multiplied by as it is stored: most
+    /// The values of output `number`, without a status's, and what each is to be multiplied by as it is stored: most
     /// candidates are not, and LLVM makes scatters of such products in lanes.
     #[inline(always)]
     fn output(&self, number: usize, value: &Value<R>) -> (&[[R; L]], [R; L]) {
@@ -111,12 +111,12 @@ impl<R: Real, const L: usize> Candidates<R, L> {
     }
 }
 
-/// Where draws go. A trait and not a closure, for the reason of [`Blocks`].
+/// Destination of draws. A trait and not a closure, for the reason of [`Blocks`].
 trait Take<R, const L: usize> {
     fn take(&mut self, done: &[Done], candidates: &Candidates<R, L>);
 }
 
-/// What candidates came to, a lane each.
+/// Results of judging candidates, one per lane.
 struct Verdicts<const L: usize> {
     accepted: [bool; L],
     above_one: [bool; L],
@@ -157,13 +157,13 @@ impl<R: Real> Kernel<R> {
         }
     }
 
-    /// How many values the first output has.
+    /// Number of values of the first output.
     #[cfg(feature = "report")]
     pub(crate) fn width(&self) -> usize {
         self.outputs[0].format.width
     }
 
-    /// Draw `index` of a stream: the values of each output, zeros where it failed. What the tally says has none.
+    /// Draw `index` of a stream: the values of each output, zeros where it failed. The status has none.
     pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, DrawStatus) {
         struct Only<'a, R>(&'a Kernel<R>, Option<(Vec<Vec<R>>, DrawStatus)>);
         impl<R: Real> Take<R, 1> for Only<'_, R> {
@@ -208,7 +208,7 @@ impl<R: Real> Kernel<R> {
         values.collect()
     }
 
-    /// Makes all of `draws`, each of which goes to `to` when it is done.
+    /// Draws a range; each draw goes to `to` when it is done.
     #[inline(always)]
     fn in_lanes<const L: usize>(&self, draws: DrawRange, to: &mut impl Take<R, L>) {
         let mut candidates = self.candidates::<L>();
@@ -357,14 +357,14 @@ fn largest<R: Real>(a: R, b: R) -> R {
     if b > a { b } else { a }
 }
 
-/// The least and the largest value of each lane.
+/// Smallest and largest value of each lane.
 struct Range<R, const L: usize> {
     low: [R; L],
     high: [R; L],
 }
 
 impl<R: Real, const L: usize> Range<R, L> {
-    /// That of values, four by four: a comparison waits for the last.
+    /// Range of values, four by four: a comparison waits for the last.
     #[inline(always)]
     fn of(values: &[[R; L]]) -> Self {
         let mut range = Range { low: [R::INFINITY; L], high: [R::ZERO; L] };

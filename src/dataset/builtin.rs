@@ -1,10 +1,10 @@
-//! The tables that are compiled in: unmodified files of the Psychophysics Toolbox, see `data/README.md`.
+//! Compiled-in tables: unmodified files of the Psychophysics Toolbox, see `data/README.md`.
 
 use std::path::Path;
 
 use super::{Table, mat};
 
-/// A table that is compiled in.
+/// Name of a table that is compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BuiltinTable {
     /// 462 Munsell papers measured by Nickerson: reflectance, 400 to 700 nm by 5 nm.
@@ -30,12 +30,12 @@ impl BuiltinTable {
         BuiltinTable::CieDaylight,
     ];
 
-    /// The table of that [name](Self::name).
+    /// Returns the table of this [name](Self::name), if there is one.
     pub fn named(name: &str) -> Option<BuiltinTable> {
         BuiltinTable::ALL.into_iter().find(|builtin| builtin.name() == name)
     }
 
-    /// What the table is called here.
+    /// Name of the table in commands and messages.
     pub fn name(self) -> &'static str {
         match self {
             BuiltinTable::Munsell => "munsell",
@@ -46,7 +46,7 @@ impl BuiltinTable {
         }
     }
 
-    /// The table itself, at its native sampling.
+    /// Reads the table, at its native sampling.
     pub fn table(self) -> Table {
         let (variable, bytes): (_, &[u8]) = match self {
             BuiltinTable::Munsell => ("sur_nickerson", include_bytes!("../../data/sur_nickerson.mat")),

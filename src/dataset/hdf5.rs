@@ -1,4 +1,4 @@
-//! HDF5 files, and those of MATLAB v7.3, which are HDF5: every numeric matrix of theirs, as MATLAB would see it.
+//! HDF5 files, and those of MATLAB v7.3, which are HDF5: every numeric matrix in them, as MATLAB would see it.
 //!
 //! HDF5's first dimension is MATLAB's last. So spectra in rows, which is how NumPy's users have them, are in columns
 //! here, and from here on all is as in older files of MATLAB's. Of more than two dimensions, those but the last count as

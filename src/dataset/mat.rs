@@ -1,4 +1,4 @@
-//! MATLAB files, whose matrices are read by the naming conventions of [`matrix`](super::matrix).
+//! MATLAB files, whose matrices are recognised by the naming conventions of [`matrix`](super::matrix).
 //!
 //! The `matfile` crate decodes the numeric arrays of v5 files. This module walks the file's elements first, for three things which
 //! that crate leaves to its caller: unpacking is capped, what is not a numeric array (structs, cells, objects) is
@@ -85,7 +85,7 @@ fn hdf5(path: &Path) -> Result<Matrices, DatasetError> {
     Err(DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() })
 }
 
-/// Whether the file is little-endian; an error says what else it is.
+/// Returns whether the file is little-endian; an error says what kind of file it is instead.
 fn endianness(bytes: &[u8]) -> Result<bool, &'static str> {
     const V4: &str = "it is of version 4, which is not supported: resave it with save(file, '-v7')";
     match bytes.get(126..HEADER) {
@@ -100,14 +100,14 @@ fn endianness(bytes: &[u8]) -> Result<bool, &'static str> {
     }
 }
 
-/// At most `cap` bytes of a zlib stream; `None` where it holds more.
+/// Unpacks at most `cap` bytes of a zlib stream; `None` where it holds more.
 fn inflate(bytes: &[u8], cap: u64) -> std::io::Result<Option<Vec<u8>>> {
     let mut out = Vec::new();
     flate2::read::ZlibDecoder::new(bytes).take(cap + 1).read_to_end(&mut out)?;
     Ok((out.len() as u64 <= cap).then_some(out))
 }
 
-/// Whether an element is a real, dense, numeric array whose dimensions its bytes can hold.
+/// Returns whether an element is a real, dense, numeric array whose dimensions its bytes can hold.
 fn is_numeric_matrix(element: &[u8], word: impl Fn(&[u8], usize) -> Option<u32>) -> bool {
     const CLASSES: std::ops::RangeInclusive<u32> = 6..=15; // double, single, and the integers
     const COMPLEX: u32 = 0x0800;

@@ -1,4 +1,4 @@
-//! Matrices of spectra by the naming conventions of the field: a matrix, and its sampling `S_x` = [start step count]
+//! Matrices of spectra by the naming conventions of the field: a matrix with its sampling `S_x` = [start step count]
 //! (nm) beside it, as in `sur_vrhel` with `S_vrhel`, or else a vector `wavelength`.
 
 use std::path::Path;
@@ -101,7 +101,7 @@ fn sampling(matrix: &Matrix) -> Option<(String, Grid)> {
     (count.fract() == 0.0).then(|| Grid::new(start, step, count as usize).ok())?.map(|grid| (suffix, grid))
 }
 
-/// The grid of a vector of wavelengths, which is for every matrix of the file.
+/// The grid of a vector of wavelengths, which serves every matrix of the file.
 fn wavelengths(matrix: &Matrix) -> Option<(String, Grid)> {
     let is_named = matches!(matrix.name.to_ascii_lowercase().as_str(), "wavelength" | "wavelengths" | "wave");
     let is_vector = matrix.rows == 1 || matrix.columns == 1;

@@ -21,10 +21,10 @@ use serde::{Deserialize, Serialize};
 use crate::grid::{self, Extrapolation, Grid, GridError, Spline};
 pub use builtin::BuiltinTable;
 
-/// The most that is read of a file, and that a compressed file may unpack to: 512 MiB, 67 million values.
+/// Limit on the bytes read of a file, and on those that a compressed file may unpack to: 512 MiB, 67 million values.
 const MAX_BYTES: u64 = 512 << 20;
 
-/// What spectra describe, and so what makes one of them physical.
+/// Kind of spectrum: illuminants and reflectances have different physical limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -44,7 +44,7 @@ impl fmt::Display for SpectrumKind {
     }
 }
 
-/// Why data cannot be used: what is wrong, where, and what to do.
+/// Error returned where data cannot be used: says what is wrong, where, and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -61,23 +61,27 @@ pub enum DatasetError {
     Mat { path: PathBuf, reason: String },
     #[error("{path:?} is not readable HDF5: {reason}")]
     Hdf5 { path: PathBuf, reason: String },
-    #[error("{path:?} is not a readable array of NumPy's: {reason}")]
+    #[error("{path:?} is not a readable NumPy array: {reason}")]
     Npy { path: PathBuf, reason: String },
     #[error("{path:?} does not say at which wavelengths its spectra are: give them, as start:step:stop")]
     NoWavelengths { path: PathBuf },
     #[error("{path:?}, line {line}: {reason}")]
     Csv { path: PathBuf, line: u64, reason: String },
     #[error(
-        "{path:?} holds no matrix of spectra with its sampling beside it (X with S_X = [start step count], or a vector wavelength); it holds {found}"
+        "{path:?} holds no matrix of spectra with its wavelengths beside it (X with S_X = [start step count], or a vector wavelength); it holds {found}"
     )]
     NoMatrix { path: PathBuf, found: String },
     #[error("{path:?} holds several matrices of spectra: say which, as in {}:{}", path.display(), candidates[0])]
     Ambiguous { path: PathBuf, candidates: Vec<String> },
-    #[error("{path:?} holds no variable {variable:?} with its sampling beside it; it holds {found}")]
+    #[error("{path:?} holds no matrix {variable:?} with its wavelengths beside it; it holds {found}")]
     NoVariable { path: PathBuf, variable: String, found: String },
-    #[error("{name}: {source}")]
+    #[error(
+        "{name}: {source} (text files have wavelengths in nm in their first column, and a spectrum in each other)"
+    )]
     Wavelengths { name: String, source: GridError },
-    #[error("{name}: {values} values in spectrum {spectrum}, but {wavelengths} wavelengths")]
+    #[error(
+        "{name}: {values} values in spectrum {spectrum}, but {wavelengths} wavelengths: give one value for each"
+    )]
     Length { name: String, spectrum: usize, values: usize, wavelengths: usize },
     #[error(
         "spectrum {spectrum} of {name}: the value at {wavelength} nm is {value}; every value must be finite"
@@ -94,18 +98,18 @@ pub enum DatasetError {
 /// Spectra of one source, as measured: increasing wavelengths (nm), finite values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// What messages call it: a path and what it takes to find it there.
+    /// Name in messages: a path and what it takes to find the spectra in that file.
     name: String,
-    /// What models call it: the same without the folder, which is nobody else's business.
+    /// Name in models: without the folder, which is private to whoever fitted them.
     source: String,
     wavelengths: Vec<f64>,
-    /// A column a spectrum.
+    /// One column per spectrum.
     spectra: DMatrix<f64>,
     kind: Option<SpectrumKind>,
 }
 
 impl Table {
-    /// Spectra given as values, each as long as `wavelengths` (nm). `name` is what messages call them.
+    /// Makes a table of values, each spectrum as long as `wavelengths` (nm). `name` is its name in messages.
     pub fn new(name: &str, wavelengths: Vec<f64>, spectra: &[Vec<f64>]) -> Result<Table, DatasetError> {
         if let Some(i) = spectra.iter().position(|s| s.len() != wavelengths.len()) {
             return Err(DatasetError::Length {
@@ -120,7 +124,7 @@ impl Table {
         Table::from_columns(name, wavelengths, spectra)
     }
 
-    /// The readers' way in: `spectra` has a row for each wavelength.
+    /// Makes a table for the readers: `spectra` has a row for each wavelength.
     fn from_columns(name: &str, wavelengths: Vec<f64>, spectra: DMatrix<f64>) -> Result<Table, DatasetError> {
         let name = name.to_owned();
         if spectra.is_empty() {
@@ -148,7 +152,8 @@ impl Table {
         Table::open_on(path, variable, None)
     }
 
-    /// The same, and `.npy` with spectra in rows, whose wavelengths are `grid`.
+    /// Reads a table as [`Table::open`] does, and also `.npy` files with spectra in rows, whose wavelengths are
+    /// `grid`.
     pub fn open_on(path: &Path, variable: Option<&str>, grid: Option<Grid>) -> Result<Table, DatasetError> {
         let bytes = read_capped(path)?;
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
@@ -164,18 +169,18 @@ impl Table {
         Ok(table)
     }
 
-    /// What messages call the table.
+    /// Name of the table in messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What the field's naming convention says the spectra are: `sur_x` reflectances, `spd_x` and `daylightX`
+    /// Kind of the spectra by the field's naming convention: `sur_x` are reflectances, `spd_x` and `daylightX`
     /// illuminants.
     pub fn kind(&self) -> Option<SpectrumKind> {
         self.kind
     }
 
-    /// The wavelengths measured, nm.
+    /// The wavelengths of the measurements, nm.
     pub fn wavelengths(&self) -> &[f64] {
         &self.wavelengths
     }
@@ -186,7 +191,7 @@ impl Table {
         self.spectra.ncols()
     }
 
-    /// The values of one spectrum, a value a wavelength.
+    /// The values of one spectrum, one per wavelength.
     pub fn spectrum(&self, index: usize) -> &[f64] {
         let bands = self.wavelengths.len();
         &self.spectra.as_slice()[index * bands..(index + 1) * bands]
@@ -216,15 +221,16 @@ impl Table {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     grid: Grid,
-    /// A column a spectrum.
+    /// One column per spectrum.
     spectra: DMatrix<f64>,
     sources: Vec<String>,
-    /// How many spectra each source has.
+    /// Number of spectra of each source.
     counts: Vec<usize>,
 }
 
 impl Dataset {
-    /// Brings `tables` to `grid` and puts them together, in order. See [`Extrapolation`] for wavelengths outside a table's.
+    /// Resamples `tables` onto `grid` and joins them, in order. See [`Extrapolation`] for wavelengths outside a
+    /// table's.
     pub fn new(tables: &[Table], grid: Grid, extend: Extrapolation) -> Result<Dataset, DatasetError> {
         if tables.is_empty() {
             return Err(DatasetError::NoSpectra { name: "an empty list of tables".to_owned() });
@@ -243,17 +249,17 @@ impl Dataset {
         self.grid
     }
 
-    /// The spectra: a row a band, a column a spectrum.
+    /// The spectra: a row per band, a column per spectrum.
     pub fn spectra(&self) -> &DMatrix<f64> {
         &self.spectra
     }
 
-    /// Where the spectra come from, a line each.
+    /// Sources of the spectra, a line each.
     pub fn sources(&self) -> &[String] {
         &self.sources
     }
 
-    /// The source of spectrum `index` and its number there, from 1: what a message should call it.
+    /// The source of spectrum `index` and its number there, from 1, as messages name it.
     pub(crate) fn place(&self, index: usize) -> String {
         let mut number = index;
         let source = self.counts.iter().position(|&count| {

@@ -1,4 +1,4 @@
-//! The adapters of this machine, and the choice of one.
+//! Graphics adapters of this machine, and the choice of one.
 
 use std::fmt;
 
@@ -9,15 +9,15 @@ use super::EngineError;
 /// A graphics adapter, as its driver describes itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Adapter {
-    /// What it is.
+    /// Name of the adapter.
     pub name: String,
-    /// The interface it is reached by: vulkan, metal, dx12.
+    /// Interface it is reached by: vulkan, metal, dx12.
     pub backend: String,
-    /// Discrete, integrated, virtual, software or other.
+    /// Kind: discrete, integrated, virtual, software or other.
     pub kind: String,
-    /// The driver and its version.
+    /// Driver and its version.
     pub driver: String,
-    /// Whether it multiplies in 64 bits.
+    /// Whether shaders on it can multiply in 64 bits.
     pub int64: bool,
 }
 
@@ -47,13 +47,13 @@ impl Adapter {
     }
 }
 
-/// The adapters of this machine, in the order in which [`EngineChoice::Adapter`](super::Choice::Adapter) counts them.
-/// `WGPU_BACKEND` limits them to some interfaces.
+/// Lists the adapters of this machine, in the order in which [`EngineChoice::Adapter`](super::EngineChoice::Adapter)
+/// counts them. The variable `WGPU_BACKEND` limits them to some interfaces.
 pub fn adapters() -> Vec<Adapter> {
     enumerate().iter().map(Adapter::of).collect()
 }
 
-/// Which adapters will do.
+/// Kinds of adapter to choose from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wanted {
     Any,
@@ -78,7 +78,7 @@ pub(super) fn best(which: Wanted) -> Result<Option<wgpu::Adapter>, EngineError> 
     Ok(enumerate().into_iter().filter(will_do).min_by_key(rank)) // the first of the best
 }
 
-/// The adapter of that index, or whose name holds that text.
+/// Finds the adapter with an index, or the one whose name holds a text.
 pub(super) fn find(wanted: &str) -> Result<wgpu::Adapter, EngineError> {
     let all = enumerate();
     let holds =

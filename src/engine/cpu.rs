@@ -9,7 +9,7 @@ use crate::cpu::{self, Kernel};
 use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::DrawRange;
 
-/// How many windows there are: one with the caller, one being computed, one between them.
+/// Number of windows: one with the caller, one being computed, one between them.
 const WINDOWS: usize = 3;
 
 /// The words of each output of each job.
@@ -19,11 +19,11 @@ pub(super) struct CpuSchedule<'a> {
     pool: &'a rayon::ThreadPool,
     jobs: Vec<ReadyJob>,
     pace: Pace,
-    /// Windows that were used before: memory that the system has given already.
+    /// Windows that were used before, to reuse their memory.
     rooms: Vec<Room>,
 }
 
-/// A job of the ensemble.
+/// A job of the schedule, with its kernel.
 struct ReadyJob {
     kernel: Kernel<f32>,
     formats: Vec<ArrayFormat>,
@@ -42,8 +42,8 @@ impl<'a> CpuSchedule<'a> {
         CpuSchedule { pool, jobs: roles, pace, rooms: Vec::new() }
     }
 
-    /// Makes `draws` of the only job with their spectra in the caller's memory, which has as many words as they
-    /// need, and hands them to `sink` as one batch.
+    /// Draws the range of the only job with its spectra in the caller's memory, which must be exactly as long as they
+    /// are, and hands it to `sink` as one batch.
     pub(super) fn fill<E>(
         &mut self,
         draws: DrawRange,
@@ -102,7 +102,7 @@ impl<'a> CpuSchedule<'a> {
     }
 }
 
-/// Fills windows until all steps are made, or the caller has gone. Returns where the windows come back to.
+/// Fills windows until all steps are drawn, or the caller has gone. Returns the channel on which windows come back.
 fn compute(
     pool: &rayon::ThreadPool,
     jobs: &[ReadyJob],
@@ -141,7 +141,8 @@ mod tests {
     use crate::random::stream::Stream;
     use crate::recipe::Recipe;
 
-    /// Every thread of the caller's pool waits for draws at once: they must come from others.
+    /// Draws come from threads of the engine's own, since every thread of the caller's pool may wait for them at
+    /// once.
     #[test]
     fn draws_are_made_for_callers_that_are_rayon_workers() {
         let recipe = Recipe::builder(&Model::builtin("granada").unwrap()).build().unwrap();

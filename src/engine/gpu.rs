@@ -1,4 +1,4 @@
-//! The GPU engine: a device of its own, and a ring of windows in flight.
+//! The GPU engine: a device that it opens, and a ring of windows in flight.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, OnceLock};
@@ -11,7 +11,7 @@ use super::{Adapter, Batch, EngineError};
 use crate::random::stream::DrawRange;
 use crate::sampler::{Prepared, Sampler};
 
-/// How many windows are in flight: one with the caller, one being computed, one waiting to be.
+/// Number of windows in flight: one with the caller, one being computed, one waiting to be.
 const RING: usize = 3;
 
 /// An open device.
@@ -20,7 +20,7 @@ pub(super) struct Gpu {
     adapter: Adapter,
     device: wgpu::Device,
     queue: wgpu::Queue,
-    /// Whether the host can map what shaders write, which spares a copy where memory is shared.
+    /// Whether the host can map the buffers that shaders write, which spares a copy where memory is shared.
     shared_memory: bool,
     /// The first error that the device reported outside of any call.
     fault: Arc<Mutex<Option<String>>>,
@@ -70,7 +70,7 @@ impl Gpu {
         (&self.device, &self.queue)
     }
 
-    /// Waits until a window can be read. Says whether that took any waiting.
+    /// Waits until a window can be read. Returns whether that took any waiting.
     fn land(&self, flight: &Flight) -> Result<bool, EngineError> {
         let mut waited = false;
         let mut poll = PollType::Poll;
@@ -85,7 +85,7 @@ impl Gpu {
         }
     }
 
-    /// Polls the device, and tells what it reported.
+    /// Polls the device, and returns the error that it reported, if any.
     pub(super) fn poll(&self, poll: PollType) -> Result<(), EngineError> {
         let polled = self.device.poll(poll);
         if let Some(reason) = self.fault.lock().expect("no holder panics").clone() {
@@ -99,18 +99,18 @@ impl Gpu {
     }
 }
 
-/// The recipes of an ensemble on a device.
+/// Jobs of a schedule on a device.
 pub(super) struct GpuSchedule<'a> {
     gpu: &'a Gpu,
     jobs: Vec<ReadyJob>,
     pace: Pace,
     /// The windows that are not in flight.
     slots: Vec<Slot>,
-    /// How many steps each has room for.
+    /// Number of steps that each slot has room for.
     capacity: u64,
 }
 
-/// A job of the ensemble.
+/// A job of the schedule, with its compute pipeline.
 struct ReadyJob {
     sampler: Sampler,
     per_step: u64,
@@ -168,7 +168,7 @@ impl<'a> GpuSchedule<'a> {
         }
     }
 
-    /// Sees to it that there are slots for the windows of so many steps. An error while drawing loses some.
+    /// Allocates slots for windows of this number of steps. An error while drawing loses some of them.
     fn make_room(&mut self, draws: &[DrawRange], steps: u64) -> Result<(), EngineError> {
         let needed = self.pace.most.min(steps);
         if self.capacity < needed {
@@ -185,7 +185,7 @@ impl<'a> GpuSchedule<'a> {
 
 /// Buffers for one window.
 struct Slot {
-    /// One a job.
+    /// Buffers of each job.
     prepared: Vec<Prepared>,
     /// Copies of the buffers that the host can map, where it cannot map the originals.
     staging: Option<Vec<wgpu::Buffer>>,
@@ -194,10 +194,10 @@ struct Slot {
 /// A window that was submitted.
 struct Flight {
     slot: Slot,
-    /// Those of each job.
+    /// Draws of each job.
     draws: Vec<DrawRange>,
     submission: wgpu::SubmissionIndex,
-    /// What mapping each buffer came to.
+    /// Result of mapping each buffer.
     mapped: Vec<Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>>,
 }
 
@@ -243,7 +243,7 @@ impl Slot {
         Flight { slot: self, draws, submission, mapped }
     }
 
-    /// The buffers, where the host maps them.
+    /// The buffers that the host maps.
     fn readable(&self) -> impl Iterator<Item = &wgpu::Buffer> {
         let originals = self.prepared.iter().flat_map(Prepared::buffers);
         // One of the two is empty.
@@ -253,7 +253,7 @@ impl Slot {
 }
 
 impl Flight {
-    /// Whether all buffers are mapped, or why one is not; `None` as long as that is open.
+    /// Result of mapping all buffers; `None` as long as one is open.
     fn state(&self) -> Option<Result<(), wgpu::BufferAsyncError>> {
         self.mapped.iter().map(|state| state.get().cloned()).collect()
     }

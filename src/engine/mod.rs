@@ -26,7 +26,7 @@ use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
 use crate::sampler::SamplerError;
 
-/// Where to draw.
+/// Choice of where to draw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum EngineChoice {
     /// On the best hardware adapter, and on the CPU where there is none: software Vulkan gives the same draws, but
@@ -41,7 +41,7 @@ pub enum EngineChoice {
     Cpu,
 }
 
-/// Why draws cannot be made, or not all of them.
+/// Error returned where draws cannot be made, or not all of them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -59,12 +59,13 @@ pub enum EngineError {
     #[error(transparent)]
     Range(#[from] SamplerError),
     #[error(
-        "draw {index} found no acceptable candidate in {attempts} attempts: allow more, or ask for less extreme spectra"
+        "draw {index} found no acceptable candidate in {attempts} attempts: allow more attempts, or ask for less \
+         extreme spectra"
     )]
     Exhausted { index: u64, attempts: u32 },
     #[error(
         "number {element} of {group:?} in scene {scene} found no acceptable candidate in {attempts} attempts: allow \
-         more, or ask for less extreme spectra"
+         more attempts, or ask for less extreme spectra"
     )]
     ExhaustedInScene { group: String, scene: u64, element: u64, attempts: u32 },
 }
@@ -79,8 +80,8 @@ fn available(found: &[Adapter]) -> String {
     }
 }
 
-/// What draws: an adapter that it opens, or the CPU. While the caller has one window of draws the next ones are being
-/// computed; memory is bounded by the windows in flight, whatever the range.
+/// Engine that draws: an adapter that it opens, or the CPU. While the caller has one window of draws the next ones
+/// are being computed; memory is bounded by the windows in flight, whatever the range.
 ///
 /// ```
 /// use spectroll::{EngineChoice, Engine, Model, Recipe, Stream};
@@ -103,25 +104,24 @@ enum Device {
     Cpu(rayon::ThreadPool),
 }
 
-/// A window of draws, as they are handed to the caller: an array for each quantity that the recipe asks for, and
-/// tallies.
+/// A window of draws, as the caller receives them: an array for each quantity that the recipe asks for, and statuses.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
-    /// Which draws these are.
+    /// Range of the draws.
     pub draws: DrawRange,
     formats: &'a [ArrayFormat],
     /// The bytes of each quantity.
     arrays: [&'a [u8]; Quantity::COUNT],
 }
 
-/// What a range of draws took.
+/// Counts over a range of draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct DrawSummary {
-    /// How many draws were made.
+    /// Number of draws made.
     pub draws: u64,
-    /// How many candidates that took.
+    /// Number of candidates they took.
     pub attempts: u64,
-    /// How many draws scaling took to 1 or above in some band ([`Bounds::Base`](crate::Bounds::Base)).
+    /// Number of draws that scaling took to 1 or above in some band ([`Bounds::Base`](crate::Bounds::Base)).
     pub above_one: u64,
 }
 
@@ -139,21 +139,22 @@ impl<'a> Batch<'a> {
         batch
     }
 
-    /// What there is, in the order of [`Quantity`], and how it lies in its array. Planes are
-    /// [`draws.count`](Batch::draws) apart, rounded up to a multiple of 4.
+    /// Formats of the arrays, in the order of [`Quantity`]. Planes are [`draws.count`](Batch::draws) apart, rounded
+    /// up to a multiple of 4.
     pub fn formats(&self) -> &'a [ArrayFormat] {
         self.formats
     }
 
-    /// The bytes of a quantity, in this machine's order; none where the recipe does not ask for it.
+    /// The bytes of a quantity, in this machine's order; empty where the recipe does not ask for it.
     pub fn bytes(&self, quantity: Quantity) -> &'a [u8] {
         self.arrays[quantity as usize]
     }
 
-    /// The values of a quantity in 32 bits, in the order of its [`ArrayFormat`]; none where the recipe does not ask for it.
+    /// The values of a quantity in 32 bits, in the order of its [`ArrayFormat`]; empty where the recipe does not ask
+    /// for it.
     ///
     /// # Panics
-    /// Where they are not [`Dtype::F32`]: half spectra, and attempts.
+    /// Where they are not [`Dtype::F32`]: spectra in 16 bits, and attempts.
     pub fn values(&self, quantity: Quantity) -> &'a [f32] {
         let other = |f: &&ArrayFormat| f.quantity == quantity && f.dtype != Dtype::F32;
         if let Some(format) = self.formats.iter().find(other) {
@@ -177,7 +178,7 @@ impl<'a> Batch<'a> {
         bytemuck::cast_slice(self.bytes(Quantity::Spectra))
     }
 
-    /// What each draw took.
+    /// Status of each draw.
     pub fn statuses(&self) -> &'a [DrawStatus] {
         bytemuck::cast_slice(self.bytes(Quantity::Attempts))
     }
@@ -215,12 +216,13 @@ impl AddAssign for DrawSummary {
 }
 
 impl Engine {
-    /// Opens what `choice` says. The variable `WGPU_ADAPTER_NAME` names the adapter where `choice` does not.
+    /// Opens the engine of `choice`. The variable `WGPU_ADAPTER_NAME` names the adapter where `choice` does not.
     pub fn new(choice: &EngineChoice) -> Result<Engine, EngineError> {
         Engine::with_threads(choice, None)
     }
 
-    /// The same, with so many threads if it comes to the CPU; one a core unless said.
+    /// Opens the engine of `choice`; if that is the CPU, with this number of threads, or one per core where it is
+    /// `None`.
     pub fn with_threads(choice: &EngineChoice, threads: Option<NonZeroUsize>) -> Result<Engine, EngineError> {
         let adapter = match choice {
             EngineChoice::Cpu => None,
@@ -239,7 +241,7 @@ impl Engine {
         Ok(Engine { device })
     }
 
-    /// The adapter that draws; `None` on the CPU.
+    /// Adapter that draws; `None` on the CPU.
     pub fn adapter(&self) -> Option<&Adapter> {
         match &self.device {
             Device::Gpu(gpu) => Some(gpu.adapter()),
@@ -247,7 +249,7 @@ impl Engine {
         }
     }
 
-    /// The device that draws and its queue, for tests and measurements of what runs on it.
+    /// Device that draws and its queue, for tests and measurements.
     #[cfg(any(test, feature = "report"))]
     pub(crate) fn device(&self) -> Option<(&wgpu::Device, &wgpu::Queue)> {
         match &self.device {
@@ -256,7 +258,7 @@ impl Engine {
         }
     }
 
-    /// Waits until the device has done what its queue was given.
+    /// Waits until the device has finished all submitted work.
     #[cfg(feature = "report")]
     pub(crate) fn wait(&self) -> Result<(), EngineError> {
         match &self.device {
@@ -265,8 +267,7 @@ impl Engine {
         }
     }
 
-    /// Makes `draws` and hands them to `sink` in order, as [`Session::draw`] does, which is what to use for more than
-    /// one range.
+    /// Draws a range and hands it to `sink` in order. For more than one range, [`Session::draw`] is faster.
     pub fn draw<E: From<EngineError>>(
         &self,
         recipe: &Recipe,
@@ -276,7 +277,7 @@ impl Engine {
         self.session(recipe)?.draw(draws, sink)
     }
 
-    /// Makes `draws` and returns their spectra, as [`Session::fill`] does, which is what to use for more than one range.
+    /// Draws a range and returns its spectra. For more than one range, [`Session::fill`] is faster.
     ///
     /// # Panics
     /// Where [`Session::fill`] does.

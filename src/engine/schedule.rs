@@ -1,4 +1,4 @@
-//! Several recipes that are drawn together, step by step, and how a range of steps is cut into windows.
+//! Schedules of several recipes that are drawn together, step by step, and the cutting of steps into windows.
 
 use std::time::{Duration, Instant};
 
@@ -7,15 +7,15 @@ use crate::quantity::ArrayFormat;
 use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
 
-/// The most bytes of a quantity in one window: all windows in flight stay in a cache of 32 MiB.
+/// Largest size of a quantity in one window, in bytes: all windows in flight stay in a cache of 32 MiB.
 const WINDOW_BYTES: u64 = 8 << 20;
 
-/// How long a window should take: short enough for an interrupt and for any watchdog, long enough to hide the cost of
-/// starting one.
+/// Duration that a window should take: short enough for an interrupt and for any watchdog, long enough to hide the
+/// cost of starting one.
 const WINDOW_TIME: Duration = Duration::from_millis(60);
 
 impl Engine {
-    /// Gets ready to draw from several recipes at once. Members of one recipe share its shader.
+    /// Prepares to draw from several recipes at once. Jobs of one recipe share its shader.
     pub(crate) fn schedule(&self, jobs: &[Job]) -> Result<Schedule<'_>, EngineError> {
         Ok(Schedule(match &self.device {
             Device::Gpu(gpu) => Backend::Gpu(gpu::GpuSchedule::new(gpu, jobs)?),
@@ -28,11 +28,11 @@ impl Engine {
 #[derive(Clone, Copy)]
 pub(crate) struct Job<'a> {
     pub(crate) recipe: &'a Recipe,
-    /// How many draws a step takes, at least 1.
+    /// Number of draws per step, at least 1.
     pub(crate) per_step: u64,
 }
 
-/// An engine with the jobs of an ensemble.
+/// An engine with the jobs of a schedule.
 pub(crate) struct Schedule<'a>(pub(super) Backend<'a>);
 
 pub(super) enum Backend<'a> {
@@ -41,8 +41,8 @@ pub(super) enum Backend<'a> {
 }
 
 impl Schedule<'_> {
-    /// Makes the first `steps` steps of each job's draws, and hands them to `sink` window by window, a batch a
-    /// job. A window is one submission for all jobs. Nothing is said of draws that failed.
+    /// Draws the first `steps` steps of each job, and hands them to `sink` window by window, a batch per job. A
+    /// window is one submission for all jobs. Draws that failed raise no error.
     pub(crate) fn draw<E: From<EngineError>>(
         &mut self,
         draws: &[DrawRange],
@@ -57,16 +57,17 @@ impl Schedule<'_> {
     }
 }
 
-/// How many steps the next window should have: grows or shrinks towards [`WINDOW_TIME`].
+/// Number of steps of the next window: grows or shrinks towards [`WINDOW_TIME`].
 pub(super) struct Pace {
     next: u64,
     pub(super) most: u64,
-    /// Windows have a multiple of this, so that none leaves half a thread idle and planes have no padding.
+    /// Divisor of the number of steps of a window, so that none leaves half a thread idle and planes have no padding.
     grain: u64,
 }
 
 impl Pace {
-    /// Windows of at most `most` steps of the jobs, whose `formats` come out. The first has about 10^5 candidates.
+    /// Makes a pace for windows of at most `most` steps of jobs whose arrays have `formats`. The first has about 10^5
+    /// candidates.
     pub(super) fn new<'a>(jobs: &[Job], formats: impl Iterator<Item = &'a [ArrayFormat]>, most: u64) -> Pace {
         let four_steps = |(job, formats): (&Job, &'a [ArrayFormat])| {
             formats.iter().map(|format| format.bytes(4 * job.per_step)).max()
@@ -85,14 +86,14 @@ impl Pace {
         self.next = (wanted as u64).clamp(self.grain, self.most) / self.grain * self.grain;
     }
 
-    /// The steps of the next window, of what is left of `steps` from `offset` on.
+    /// The next window of what is left of `steps` from `offset` on; `None` where nothing is.
     pub(super) fn window(&self, steps: u64, offset: u64) -> Option<Window> {
         let left = steps - offset;
         (left > 0).then(|| Window { offset, steps: left.min(self.next) })
     }
 }
 
-/// Some steps of an ensemble.
+/// Some steps of a schedule.
 #[derive(Clone, Copy)]
 pub(super) struct Window {
     pub(super) offset: u64,

@@ -7,8 +7,8 @@ use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
 
 impl Engine {
-    /// Gets ready to draw from a recipe: what that takes (a compiled shader, buffers) is paid once, and serves any
-    /// number of [`Session::draw`].
+    /// Prepares to draw from a recipe: the shader is compiled and the buffers are allocated once, for any number of
+    /// calls of [`Session::draw`].
     pub fn session<'a>(&'a self, recipe: &'a Recipe) -> Result<Session<'a>, EngineError> {
         Ok(Session { recipe, schedule: self.schedule(&[Job { recipe, per_step: 1 }])? })
     }
@@ -21,7 +21,7 @@ pub struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// How many values the spectra of `draws` have: rows, one after the other.
+    /// Number of values in the spectra of `draws`: rows, one after the other.
     pub(super) fn values(&self, draws: DrawRange) -> usize {
         let format = self.recipe.formats().into_iter().find(|format| format.quantity == Quantity::Spectra);
         let format = format.expect("the recipe asks for spectra");
@@ -30,8 +30,9 @@ impl Session<'_> {
         format.values(draws.count) as usize
     }
 
-    /// Makes `draws` with their spectra in the caller's memory: draw by draw, a value for each band, and room
-    /// for padding if the recipe asks for it, which the CPU leaves as it is. It writes the rest there as it makes it.
+    /// Draws a range with its spectra in the caller's memory: draw by draw, a value for each band, and room for
+    /// padding if the recipe asks for it, which the CPU leaves as it is. The CPU writes
+    /// everything else there directly, without a copy.
     ///
     /// # Panics
     /// Where the slice is not as long as they are, or the recipe asks for no spectra, in 16 bits, or in planes.
@@ -66,7 +67,7 @@ impl Session<'_> {
         Ok(summary)
     }
 
-    /// Makes `draws` and hands them to `sink` in order, window by window. The first error ends it.
+    /// Draws a range and hands it to `sink` in order, window by window. The first error ends it.
     pub fn draw<E: From<EngineError>>(
         &mut self,
         draws: DrawRange,

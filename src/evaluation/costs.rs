@@ -1,6 +1,6 @@
-//! What each part of a draw costs on an adapter: the shader without the part, timed in turn with the whole.
+//! Cost of each part of a draw on an adapter: the shader without the part, timed in turn with the whole.
 //!
-//! What is drawn has so little covariance that the first candidate always passes, with or without the part, so that
+//! The model has so little covariance that the first candidate always passes, with or without the part, so that
 //! only the part's work is missing. Shares need not sum to 1: parts overlap where a device does several things at once,
 //! and what waits for memory has time for arithmetic.
 
@@ -17,7 +17,7 @@ use crate::recipe::{Recipe, RecipeError};
 use crate::sampler::{Prepared, Sampler};
 use crate::wgsl::{self, Tables};
 
-/// Draws of a dispatch. Their spectra stay below the least size of a buffer that a device may offer.
+/// Draws per dispatch. Their spectra stay below the least size of a buffer that a device may offer.
 const COUNT: u64 = 1 << 19;
 
 /// A part of a draw.
@@ -30,17 +30,17 @@ pub enum Part {
     Normals,
     /// All but one product of each band with the normals, both for the test and for what is stored.
     Reconstruction,
-    /// Whether the spectrum is physical.
+    /// Test that the spectrum is physical.
     Test,
     /// All but one of the stores of a spectrum.
     Store,
 }
 
 impl Part {
-    /// All of them, in the order in which a draw does them.
+    /// All parts, in the order in which a draw does them.
     pub const ALL: [Part; 5] = [Part::Philox, Part::Normals, Part::Reconstruction, Part::Test, Part::Store];
 
-    /// What it is called.
+    /// Name of the part.
     pub fn name(self) -> &'static str {
         match self {
             Part::Philox => "Philox",
@@ -52,20 +52,20 @@ impl Part {
     }
 }
 
-/// What a part costs.
+/// Share of a draw's cost that a part has.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Share {
     /// The part.
     pub part: Part,
-    /// The time that a draw without it saves, in parts of the whole: the median of several runs.
+    /// Time that a draw without the part saves, relative to the whole: the median of several runs.
     pub median: f64,
-    /// The least of the runs.
+    /// Smallest of the runs.
     pub least: f64,
-    /// The most.
+    /// Largest of the runs.
     pub most: f64,
 }
 
-/// Why costs cannot be told apart.
+/// Error returned where costs cannot be measured.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -76,26 +76,26 @@ pub enum CostError {
     Engine(#[from] EngineError),
 }
 
-/// A measurement on an adapter, run by run.
+/// Measurement on an adapter, run by run.
 pub struct Costs<'a> {
     engine: &'a Engine,
     whole: Prepared,
     parts: Vec<Without>,
-    /// How often a shader is dispatched in a run.
+    /// Number of dispatches of a shader in a run.
     times: u32,
 }
 
-/// The shader without a part.
+/// Shader without a part.
 struct Without {
     part: Part,
     prepared: Prepared,
-    /// What each run saved.
+    /// Time saved in each run.
     saved: Vec<f64>,
 }
 
 impl<'a> Costs<'a> {
-    /// Gets ready to draw spectra of a model, whole and without each part, for so much time each in a run. `None` on
-    /// the CPU: there the parts are one loop, and a profiler tells them apart.
+    /// Prepares to draw spectra of a model, whole and without each part, for this time each in a run. `None` on the
+    /// CPU: there the parts are one loop, and a profiler tells them apart.
     pub fn new(engine: &'a Engine, model: &Model, time: Duration) -> Result<Option<Costs<'a>>, CostError> {
         let Some((device, _)) = engine.device() else { return Ok(None) };
         let program = never_rejected(model)?;
@@ -114,7 +114,7 @@ impl<'a> Costs<'a> {
         Ok(Some(costs))
     }
 
-    /// Measures all of them once.
+    /// Measures the whole and each part once.
     pub fn run(&mut self) -> Result<(), CostError> {
         let all = self.seconds(&self.whole)?;
         for i in 0..self.parts.len() {
@@ -124,7 +124,7 @@ impl<'a> Costs<'a> {
         Ok(())
     }
 
-    /// What the runs came to; nothing where there was none.
+    /// Shares over all runs; empty where there was none.
     pub fn shares(&self) -> Vec<Share> {
         let share = |Without { part, saved, .. }: &Without| {
             let mut saved = saved.clone();
@@ -135,7 +135,7 @@ impl<'a> Costs<'a> {
         self.parts.iter().filter_map(share).collect()
     }
 
-    /// How long the dispatches of a run take, in one submission.
+    /// Time that the dispatches of a run take, in one submission.
     fn seconds(&self, prepared: &Prepared) -> Result<f64, EngineError> {
         let (device, queue) = self.engine.device().expect("it is an adapter's");
         let start = Instant::now();
@@ -147,12 +147,12 @@ impl<'a> Costs<'a> {
     }
 }
 
-/// Spectra and tallies of a model that has next to no covariance.
+/// Makes a program for spectra and statuses of a model that has next to no covariance.
 fn never_rejected(model: &Model) -> Result<Program, RecipeError> {
     Ok(Recipe::builder(model).covariance_scale(1e-4).build()?.program().with_status())
 }
 
-/// The sampler of a program without a part.
+/// Makes the sampler of a program without a part.
 fn sampler(device: &Device, program: &Program, part: Option<Part>) -> Result<Sampler, EngineError> {
     let target = Sampler::target(device);
     let (text, tables) = match part {
@@ -162,7 +162,7 @@ fn sampler(device: &Device, program: &Program, part: Option<Part>) -> Result<Sam
     Ok(Sampler::with_text(device, program, target, text, &tables)?)
 }
 
-/// The shader of a program without a part.
+/// Writes the shader of a program without a part.
 fn without(program: &Program, target: wgsl::Dialect, part: Part) -> (String, Tables) {
     let (text, tables) = wgsl::shader(program, target);
     let text = match part {
@@ -178,7 +178,7 @@ fn without(program: &Program, target: wgsl::Dialect, part: Part) -> (String, Tab
     (text, tables)
 }
 
-/// The program with one product in each band, but every normal in use.
+/// Changes a program to one product in each band, with every normal in use.
 fn one_gain_each(program: &Program) -> Program {
     let mut program = program.clone();
     let components = program.components();
@@ -192,7 +192,7 @@ fn one_gain_each(program: &Program) -> Program {
     program
 }
 
-/// The text with another body of a function.
+/// Replaces the body of a function in a text.
 fn with_body(text: &str, name: &str, body: impl FnOnce(&str) -> String) -> String {
     let start = text.find(&format!("\nfn {name}(")).expect("the shader has the function");
     let open = start + text[start..].find("{\n").expect("it has a body") + 2;
@@ -200,7 +200,7 @@ fn with_body(text: &str, name: &str, body: impl FnOnce(&str) -> String) -> Strin
     format!("{}    {}{}", &text[..open], body(&text[open..close]), &text[close..])
 }
 
-/// The body of `store` with one store of spectra: of the sum of all words, so that all are computed.
+/// Rewrites the body of `store` with one store of spectra: of the sum of all words, so that all are computed.
 fn one_store(body: &str) -> String {
     let is_store = |line: &&str| line.trim_start().starts_with("spectra[");
     let (stores, rest): (Vec<&str>, Vec<&str>) = body.lines().partition(|line| is_store(line));
@@ -222,7 +222,7 @@ mod tests {
         Model::builtin("munsell-vrhel").unwrap()
     }
 
-    /// What is left out is not there, and the rest is: by words that only the part's code has.
+    /// The part that is left out is absent, and the rest is present: by words that only the part's code has.
     #[test]
     fn each_shader_is_valid_and_lacks_its_part_alone() {
         let program = never_rejected(&model()).unwrap();
@@ -248,7 +248,8 @@ mod tests {
         }
     }
 
-    /// Otherwise a part would be blamed for what its absence does to the number of attempts.
+    /// The first candidate is taken; otherwise a part would be blamed for what its absence does to the number of
+    /// attempts.
     #[test]
     fn every_shader_takes_the_first_candidate() {
         let engine = Engine::new(&EngineChoice::Gpu).expect("this test needs an adapter");

@@ -1,4 +1,4 @@
-//! What examines the project itself: statistics, stiff and extreme cases, costs, and the report that shows them.
+//! Examination of the project itself: statistics, stiff and extreme cases, costs, and the report that shows them.
 //!
 //! Not for users of the library: nothing here is kept stable.
 

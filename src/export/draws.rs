@@ -1,4 +1,4 @@
-//! Draws of a recipe as a data set: a row a draw, its quantities as columns.
+//! Draws of a recipe as a data set: a row per draw, its quantities as columns.
 
 use std::borrow::Cow;
 use std::ops::{ControlFlow, Range};
@@ -38,7 +38,7 @@ impl<'a> DrawExport<'a> {
         DrawExport { stream: name.map(str::to_owned), ..self }
     }
 
-    /// What the data set holds, and what it is made from.
+    /// Schema of the data set: its columns, and the model, recipe and seed of the draws.
     pub fn schema(&self, output: &Output) -> Schema {
         let fields = self.recipe.formats().into_iter();
         Schema {
@@ -51,7 +51,7 @@ impl<'a> DrawExport<'a> {
         }
     }
 
-    /// What lies beside the rows.
+    /// Files beside the rows.
     pub fn companions(&self) -> Companions {
         let spectra = SpectraArray {
             name: Quantity::Spectra.name().to_owned(),
@@ -66,12 +66,12 @@ impl<'a> DrawExport<'a> {
         Companions { spectra: vec![spectra], first: self.draws.first, files }
     }
 
-    /// The rows, to be drawn by an engine.
+    /// Prepares the rows, to be drawn by an engine.
     pub fn rows(&self, engine: &'a Engine) -> Result<DrawRows<'a>, EngineError> {
         DrawRows::new(self.recipe, engine, self.draws)
     }
 
-    /// Draws and writes the whole.
+    /// Draws and writes the whole data set.
     pub fn write(&self, engine: &'a Engine, output: &Output) -> Result<DrawSummary, ExportError> {
         let (schema, companions) = (self.schema(output), self.companions());
         output.check(&schema, &companions)?;
@@ -112,12 +112,12 @@ pub struct DrawRows<'a> {
     recipe: &'a Recipe,
     session: Session<'a>,
     draws: DrawRange,
-    /// A summary of those that were drawn.
+    /// Summary of the draws made.
     pub summary: DrawSummary,
 }
 
 impl<'a> DrawRows<'a> {
-    /// The rows of some draws of a recipe.
+    /// Prepares the rows of a range of draws.
     pub fn new(
         recipe: &'a Recipe,
         engine: &'a Engine,
@@ -128,7 +128,7 @@ impl<'a> DrawRows<'a> {
 }
 
 impl Rows for DrawRows<'_> {
-    /// Of draws that no data set holds.
+    /// Sum of draws that no data set holds.
     fn rounding(&mut self) -> Result<String, EngineError> {
         let mut sum = Sum::default();
         self.session.draw(Stream::named(0, "rounding").draws(0..4096), |batch| {
@@ -153,7 +153,7 @@ impl Rows for DrawRows<'_> {
     }
 }
 
-/// The columns of a window: of the status, the attempts.
+/// Columns of a window: of statuses, the attempts.
 fn columns<'a>(recipe: &Recipe, batch: &Batch<'a>) -> Vec<Cow<'a, [u8]>> {
     let column = |quantity| match quantity {
         Quantity::Attempts => batch

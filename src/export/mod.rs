@@ -1,5 +1,5 @@
-//! From a recipe or a scene to a file, a stream or a set of chunks: what the program and other hosts write data sets
-//! with.
+//! Writing of data sets, from a recipe or a scene to a file, a stream or a set of chunks: for the program and for
+//! other hosts.
 //!
 //! A [`DrawExport`] or a [`SceneExport`] says what the rows of a data set are, and [`Output`] where they go. What is
 //! written depends on these two alone, and not on the engine that draws.

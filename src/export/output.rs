@@ -1,4 +1,4 @@
-//! Where a data set goes, and how it is written there.
+//! Destination of a data set, and how it is written there.
 
 use std::path::{Path, PathBuf};
 
@@ -35,7 +35,7 @@ impl Destination {
     }
 }
 
-/// Where a data set goes, and how it is written there. See [`Output::to`].
+/// Destination of a data set, and how it is written there. See [`Output::to`].
 #[derive(Clone, Debug)]
 pub struct Output {
     pub(super) path: PathBuf,
@@ -59,7 +59,7 @@ impl Output {
         Ok(Output::at(path, destination))
     }
 
-    /// What `destination` says at `path`, which standard output does not need.
+    /// Writes to `path` as a `destination`; standard output needs no path.
     pub fn at(path: impl AsRef<Path>, destination: Destination) -> Output {
         Output {
             path: path.as_ref().to_owned(),
@@ -86,7 +86,7 @@ impl Output {
         Output { shard, ..self }
     }
 
-    /// What to do with what exists already ([`SetMode::Create`]). Only sets can be resumed.
+    /// Sets what happens to a data set that exists already ([`SetMode::Create`]). Only sets can be resumed.
     pub fn mode(self, mode: SetMode) -> Self {
         Output { mode, ..self }
     }

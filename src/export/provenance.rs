@@ -1,4 +1,4 @@
-//! What a data set records of where it came from: sums that tell whether two programs would draw the same.
+//! Provenance that a data set records: sums that tell whether two programs would draw the same.
 
 use crate::model::Model;
 use crate::recipe::Recipe;
@@ -23,7 +23,7 @@ pub fn shader_sum(recipe: &Recipe) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-/// The sum of bytes as they come.
+/// Running sum of bytes.
 #[derive(Clone, Debug, Default)]
 pub struct Sum(blake3::Hasher);
 

@@ -1,4 +1,4 @@
-//! Scenes as a data set: a row a scene, its arrays as columns, and beside them what all scenes share.
+//! Scenes as a data set: a row per scene, its arrays as columns, and beside them the arrays that all scenes share.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use crate::output::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
 use crate::quantity::Quantity;
 use crate::scene::{Array, GroupKind, GroupSummary, Scene, SceneSession};
 
-/// About how many spectra tell how an engine rounds, and in how many scenes at most.
+/// Approximate number of spectra that tell how an engine rounds, and the largest number of scenes for them.
 const ROUNDED: (u64, u64) = (4096, 64);
 
 /// The arrays of a scene that are wanted.
@@ -92,7 +92,8 @@ impl<'a> SceneExport<'a> {
         SceneExport { file: Some((name.to_owned(), text.to_owned())), ..self }
     }
 
-    /// What the data set holds, and what it is made from. The shared arrays have no values yet.
+    /// Schema of the data set: its columns, and the scene and seed it is made from. The shared arrays have no values
+    /// yet.
     pub fn schema(&self, output: &Output) -> Schema {
         let holds_shared = output.destination().holds_shared_arrays();
         let is_text = output.destination() == Destination::SpdFolder;
@@ -114,7 +115,7 @@ impl<'a> SceneExport<'a> {
         }
     }
 
-    /// What lies beside the rows.
+    /// Files beside the rows.
     pub fn companions(&self) -> Companions {
         let files = self.file.iter().map(|(_, text)| ("_scene.toml", text.clone())).collect();
         Companions { spectra: self.spectra().collect(), first: self.scenes.start, files }

@@ -10,7 +10,7 @@ use crate::output::{
     CsvWriter, FileFormat, FileWriter, OutputError, Schema, SetStatus, SetWriter, SpdFolder,
 };
 
-/// Why an export ended before its data set was complete.
+/// Error that ended an export before its data set was complete.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
@@ -32,9 +32,9 @@ pub enum ExportError {
     /// A set stays unfinished: what is finished of it is in its folder, and another run can go on from there.
     #[error("{cause}; {}", kept(*.done, .folder))]
     Unfinished {
-        /// What ended it.
+        /// The error that ended it.
         cause: Box<ExportError>,
-        /// The number of chunks of this process that are finished, and of how many; `None` where that could not be
+        /// The number of this process's chunks that are finished, and of all; `None` where that could not be
         /// written down.
         done: Option<(u64, u64)>,
         /// The folder that holds them.

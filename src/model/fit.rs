@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, SVD};
 use crate::dataset::{Dataset, SpectrumKind};
 use crate::model::{MAX_COMPONENTS, Model, ModelParts, Normalization};
 
-/// How to fit.
+/// Settings of a fit.
 ///
 /// ```
 /// use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, Grid, SpectrumKind};
@@ -23,7 +23,7 @@ pub struct Fit {
     normalization: Normalization,
 }
 
-/// Why a model cannot be fitted.
+/// Error returned where a model cannot be fitted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -134,7 +134,7 @@ impl Fit {
         .expect("singular vectors are orthonormal and variances are not negative"))
     }
 
-    /// The spectra, a column each, divided by what `normalization` says (eq. 1), and what that was.
+    /// The spectra, a column each, divided as `normalization` says (eq. 1), and their divisors.
     fn normalized(&self, data: &Dataset) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
         let mut spectra = data.spectra().clone();
         let mut powers = Vec::new();

@@ -24,7 +24,7 @@ pub const MAX_COMPONENTS: usize = 1000;
 /// The version of the file format that this program writes, and the newest that it reads.
 const SCHEMA: u32 = 1;
 
-/// What each spectrum was divided by before the fit.
+/// Divisor of each spectrum before the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -44,10 +44,10 @@ pub struct Model {
     parts: ModelParts,
 }
 
-/// What a model consists of; [`Model::new`] checks it.
+/// Parts of a model; [`Model::new`] checks them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelParts {
-    /// What the spectra are.
+    /// Kind of the spectra.
     pub kind: SpectrumKind,
     /// The wavelengths, n of them.
     pub grid: Grid,
@@ -61,15 +61,15 @@ pub struct ModelParts {
     pub weight_covariance: DMatrix<f64>,
     /// The share of the data's variance that each component explains, k values.
     pub explained_variance: Vec<f64>,
-    /// What the spectra were divided by.
+    /// Divisor of the spectra.
     pub normalization: Normalization,
-    /// What each of the spectra was divided by, positive; none where that is not known or nothing was.
+    /// Divisor of each of the spectra, positive; empty where they are not known or nothing was divided.
     pub powers: Vec<f64>,
-    /// Where the data came from, a line each.
+    /// Sources of the data, a line each.
     pub sources: Vec<String>,
 }
 
-/// Why something is not a model.
+/// Error returned where something is not a model.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -170,12 +170,12 @@ impl Model {
             .expect("numbers and strings are always JSON")
     }
 
-    /// What the model consists of.
+    /// Parts of the model.
     pub fn parts(&self) -> &ModelParts {
         &self.parts
     }
 
-    /// What the spectra are.
+    /// Kind of the spectra.
     pub fn kind(&self) -> SpectrumKind {
         self.parts.kind
     }

@@ -1,5 +1,5 @@
-//! Text: a header, then a line a draw, each value the shortest decimal that reads back as the same number. The columns
-//! of spectra are headed by their wavelengths in nm. Nothing in it ever needs quotes.
+//! Text: a header, then a line per draw, each value the shortest decimal that reads back as the same number. The
+//! columns of spectra are headed by their wavelengths in nm. Nothing in it ever needs quotes.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -11,7 +11,7 @@ use crate::quantity::Dtype;
 pub(super) struct Csv<W: Write> {
     to: W,
     schema: Schema,
-    /// The lines of a window, whose memory the next one uses.
+    /// Lines of a window, in memory that the next window reuses.
     text: String,
 }
 
@@ -48,7 +48,7 @@ impl<W: Write> Encoder for Csv<W> {
     }
 }
 
-/// The headings of a field's columns.
+/// Headings of a field's columns.
 fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
     if let Some((_, count)) = &field.outer {
         let one =
@@ -70,7 +70,7 @@ fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
     }
 }
 
-/// Adds the shortest decimal that reads back as the same value of its type.
+/// Appends the shortest decimal that reads back as the same value of its type.
 fn push(text: &mut String, dtype: Dtype, value: f64) {
     match dtype {
         Dtype::F64 | Dtype::U32 => write!(text, "{value}"),

@@ -1,5 +1,5 @@
-//! HDF5: a data set a quantity, chunked by draws, the wavelengths beside them, and what the draws were made from as
-//! attributes. Of the oldest generation of the format that will do, so that every reader knows it.
+//! HDF5: a data set per quantity, chunked by draws, with the wavelengths beside them, and the model, recipe and seed
+//! as attributes. Files use the oldest generation of the format that can hold them, so that every reader knows it.
 
 use std::io;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::Encoder;
 use super::schema::{Field, Schema, SharedArray};
 use crate::quantity::Dtype;
 
-/// About how many bytes a chunk has: what the library of most readers keeps in its cache.
+/// Approximate size of a chunk in bytes: that of the cache in most readers' library.
 const CHUNK_BYTES: usize = 1 << 20;
 
 pub(super) struct Hdf5 {
@@ -60,7 +60,7 @@ impl Encoder for Hdf5 {
     }
 }
 
-/// A file over the temporary one that is there, with room for a header of its own before it.
+/// Opens the temporary file as HDF5, with room for a header of its own before it.
 pub(super) fn create(path: &Path, userblock: u64) -> Result<H5File, Hdf5Error> {
     let options = H5File::options().libver(LibverBound::Earliest).track_times(false).no_locking();
     options.userblock(userblock).create(path)
@@ -83,7 +83,7 @@ pub(super) fn constant(file: &H5File, constant: &SharedArray) -> Result<H5Datase
     Ok(set)
 }
 
-/// The quantities of a file, filled chunk by chunk.
+/// Data sets of a file, filled chunk by chunk.
 pub(super) struct Tables {
     pub(super) tables: Vec<Table>,
 }
@@ -91,11 +91,11 @@ pub(super) struct Tables {
 pub(super) struct Table {
     pub(super) set: H5Dataset,
     field: Field,
-    /// The bytes of a chunk.
+    /// Size of a chunk in bytes.
     chunk: usize,
-    /// The bytes that do not fill a chunk yet.
+    /// Bytes that do not fill a chunk yet.
     rest: Vec<u8>,
-    /// How many chunks were written.
+    /// Number of chunks written.
     written: usize,
 }
 
@@ -126,7 +126,7 @@ impl Tables {
         self.tables.iter_mut().zip(columns).try_for_each(|(table, column)| table.write(column))
     }
 
-    /// Writes what does not fill a chunk.
+    /// Writes the bytes that do not fill a chunk.
     pub(super) fn finish(&mut self) -> Result<(), Hdf5Error> {
         self.tables.iter_mut().try_for_each(|table| {
             let mut rest = std::mem::take(&mut table.rest);
@@ -162,14 +162,14 @@ impl Table {
     }
 }
 
-/// A text of fixed length, in ASCII as far as it is.
+/// Writes a text attribute of fixed length, in ASCII where that suffices.
 pub(super) fn text_attribute(set: &H5Dataset, name: &str, text: &str) -> Result<(), Hdf5Error> {
     let charset = u8::from(!text.is_ascii());
     let datatype = DatatypeMessage::FixedString { size: text.len() as u32, padding: 1, charset };
     set.set_attr_typed(name, datatype, text.as_bytes().to_vec())
 }
 
-/// The error below, where it was one of writing.
+/// The I/O error within an error, or one around it.
 pub(super) fn io_error(error: Hdf5Error) -> io::Error {
     match error {
         Hdf5Error::Io(error) => error,

@@ -1,4 +1,4 @@
-//! Data sets as files, one format a module. What is under its name is complete.
+//! Data sets as files, one format per module. A file or folder under its final name is complete.
 //!
 //! A data set is columns of numbers, a row a draw ([`Schema`]). It comes in windows of any length, in order, and ends
 //! in a single file ([`FileWriter`]), a folder of text files ([`SpdFolder`]), or a set of chunks that can be resumed
@@ -27,23 +27,23 @@ pub use schema::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
 pub use set::{ChunkFormat, Progress, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge};
 pub use spd::{MOST_FILES, SpdFolder, files as spd_files};
 
-/// A format of data sets.
+/// File format of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum FileFormat {
     /// NumPy: one array, C order.
     Npy,
-    /// NumPy: an array a quantity.
+    /// NumPy: one array per quantity.
     Npz,
-    /// Text: a line a draw.
+    /// Text: one line per draw.
     Csv,
     /// HDF5, chunked by draws.
     #[cfg_attr(feature = "cli", value(name = "h5"))]
     Hdf5,
     /// MATLAB: v5 where every variable is below 2 GB, and v7.3 above.
     Mat,
-    /// Parquet: a column a quantity.
+    /// Parquet: one column per quantity.
     Parquet,
     /// A Zarr store, version 3.
     Zarr,
@@ -51,7 +51,7 @@ pub enum FileFormat {
     Spd,
 }
 
-/// Why a data set cannot be written, or not used.
+/// Error returned where a data set cannot be written, or cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -68,7 +68,7 @@ pub enum OutputError {
     NotOurs { path: PathBuf, expected: &'static str },
     #[error("{path:?} is not a folder, and a folder is what would be written: name another")]
     NotAFolder { path: PathBuf },
-    #[error("{path:?} is not a plain file, and would be replaced by one: name another")]
+    #[error("{path:?} is not a plain file, and would be replaced by one: choose another name")]
     Special { path: PathBuf },
     #[error("{folder:?} does not exist: create it first")]
     NoFolder { folder: PathBuf },
@@ -81,7 +81,8 @@ pub enum OutputError {
     #[error("{path:?}: this build leaves out {what}: build it with the feature {feature}")]
     NotBuilt { path: PathBuf, what: &'static str, feature: &'static str },
     #[error(
-        "{path:?} would be a folder of {count} files, and folders of more than {MOST_FILES} are slow to open and to delete"
+        "{path:?} would be a folder of {count} files, and folders of more than {MOST_FILES} are slow to open and to \
+         delete: choose another format, or write it anyway"
     )]
     ManyFiles { path: PathBuf, count: u64 },
     #[error("{root:?} holds an unfinished data set: resume it, or replace it")]
@@ -107,7 +108,7 @@ fn not_a_set(path: &Path) -> String {
     }
 }
 
-/// Where the chunks of a set are until it is complete.
+/// Folder of a set's chunks until it is complete.
 fn partial(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".partial");
@@ -115,10 +116,10 @@ fn partial(path: &Path) -> PathBuf {
 }
 
 impl FileFormat {
-    /// The names that tell formats apart.
+    /// Extensions that name formats.
     const EXTENSIONS: &str = ".npy, .npz, .csv, .h5, .mat, .parquet or .zarr";
 
-    /// The format that the extension of `path` names.
+    /// Returns the format that the extension of `path` names.
     pub fn of(path: &Path) -> Result<FileFormat, OutputError> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("npy") => Ok(FileFormat::Npy),
@@ -180,7 +181,7 @@ impl FileFormat {
 }
 
 impl ChunkFormat {
-    /// An error where the layout cannot hold what a schema says, or was left out of this build.
+    /// Returns an error where the format cannot hold a schema, or was left out of this build.
     pub fn check(self, path: &Path, schema: &Schema) -> Result<(), OutputError> {
         match self {
             ChunkFormat::Zarr { zstd: Some(_) } if !cfg!(feature = "zstd") => {
@@ -192,16 +193,16 @@ impl ChunkFormat {
     }
 }
 
-/// What turns windows of columns into the bytes of one file.
+/// Encoder of windows of columns into the bytes of one file.
 trait Encoder {
-    /// Takes the next window.
+    /// Writes the next window.
     fn write(&mut self, columns: &[&[u8]]) -> io::Result<()>;
 
     /// Ends the file.
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
 
-/// A file that appears under its name only when it is complete.
+/// Writer of a file that appears under its name only when it is complete.
 pub struct FileWriter {
     encoder: Box<dyn Encoder>,
     pending: PendingFile,
@@ -223,7 +224,7 @@ impl FileWriter {
         Ok(FileWriter { encoder, pending })
     }
 
-    /// Takes the next draws: a column for each field of the schema.
+    /// Writes the next draws: a column for each field of the schema.
     pub fn write(&mut self, columns: &[&[u8]]) -> Result<(), OutputError> {
         self.encoder.write(columns).map_err(|e| self.pending.failed(e))
     }
@@ -261,7 +262,7 @@ fn encoder(
     })
 }
 
-/// CSV on its way to something that is no file, such as standard output.
+/// Writer of CSV to a stream, such as standard output.
 pub struct CsvWriter(Box<dyn Encoder>);
 
 impl CsvWriter {
@@ -270,7 +271,7 @@ impl CsvWriter {
         Ok(CsvWriter(Box::new(csv::Csv::begin(to, schema)?)))
     }
 
-    /// Takes the next draws: a column for each field of the schema.
+    /// Writes the next draws: a column for each field of the schema.
     pub fn write(&mut self, columns: &[&[u8]]) -> io::Result<()> {
         self.0.write(columns)
     }

@@ -1,4 +1,4 @@
-//! NumPy's `.npy`: one array, C order. The `npyz` crate writes the header; what follows is the bytes as they are.
+//! NumPy's `.npy`: one array, C order. The `npyz` crate writes the header; the bytes of the draws follow unchanged.
 
 use std::io::{self, Write};
 
@@ -32,13 +32,13 @@ impl<W: Write> Encoder for Npy<W> {
     }
 }
 
-/// A whole small file.
+/// The bytes of a whole small file.
 pub(super) fn file(dtype: &str, shape: &[u64], data: &[u8]) -> io::Result<Vec<u8>> {
     let header = header(dtype, shape)?;
     Ok([&header, data].concat())
 }
 
-/// What comes before the data of an array.
+/// Bytes before the data of an array.
 pub(super) fn header(dtype: &str, shape: &[u64]) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let dtype = npyz::DType::Plain(dtype.parse().expect("it is one of NumPy's types"));
@@ -47,7 +47,7 @@ pub(super) fn header(dtype: &str, shape: &[u64]) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What NumPy's headers call a type.
+/// Name of a type in NumPy's headers.
 pub(super) fn type_string(dtype: Dtype) -> &'static str {
     match dtype {
         Dtype::F16 => "<f2",

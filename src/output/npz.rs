@@ -1,4 +1,4 @@
-//! NumPy's `.npz`: an array a quantity, the wavelengths, and what the draws were made from as a text.
+//! NumPy's `.npz`: an array per quantity, the wavelengths, and the model, recipe and seed as text.
 //!
 //! Arrays stand in the file one after another, but arrive side by side. Their sizes are known, so the places of all
 //! of them are, and each window goes to several of them; only the checksums wait for the end. (The crates that write
@@ -15,11 +15,11 @@ use super::schema::Schema;
 /// An array in the file.
 struct Entry {
     name: String,
-    /// Where its local header is.
+    /// Offset of its local header.
     offset: u64,
-    /// Where its next bytes go.
+    /// Offset of its next bytes.
     next: u64,
-    /// The bytes of the array with its `.npy` header.
+    /// Size of the array with its `.npy` header.
     size: u64,
     checksum: Hasher,
 }
@@ -27,7 +27,7 @@ struct Entry {
 pub(super) struct Npz<W> {
     to: W,
     schema: Schema,
-    /// The fields of the schema, and then what else there is.
+    /// Entries of the schema's fields, followed by the other entries.
     entries: Vec<Entry>,
     end: u64,
 }
@@ -52,7 +52,7 @@ impl<W: Write + Seek> Npz<W> {
         Ok(npz)
     }
 
-    /// Adds an array that begins with `start`, and of which `rest` more bytes will come.
+    /// Adds an array that begins with `start` and has `rest` more bytes to come.
     fn add(&mut self, name: &str, start: &[u8], rest: u64) -> io::Result<()> {
         let mut entry = Entry {
             name: npyz::npz::file_name_from_array_name(name),
@@ -101,14 +101,14 @@ impl<W: Write + Seek> Encoder for Npz<W> {
     }
 }
 
-/// The version of the zip format that knows sizes of 64 bits.
+/// First version of the zip format that has 64-bit sizes.
 const VERSION: u16 = 45;
 
-/// "See the extra field."
+/// Marks a size that stands in the extra field.
 const ELSEWHERE: u32 = u32::MAX;
 
 impl Entry {
-    /// From the version to the length of the name, which both headers share.
+    /// Header bytes from the version to the length of the name, which both headers share.
     fn common(&self, checksum: u32) -> Vec<u8> {
         const FLAGS_AND_METHOD: u32 = 0; // stored
         const TIME_AND_DATE: u32 = 0x0021_0000; // the first of 1980: the same draws make the same file
@@ -120,7 +120,7 @@ impl Entry {
         bytes
     }
 
-    /// The extra field of 64-bit numbers.
+    /// Encodes the extra field of 64-bit numbers.
     fn extra(numbers: &[u64]) -> Vec<u8> {
         let mut bytes = [1u16.to_le_bytes(), (8 * numbers.len() as u16).to_le_bytes()].concat();
         numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
@@ -156,7 +156,7 @@ impl Entry {
     }
 }
 
-/// What ends the file: where the directory is, in 64 bits, where that is written, and the mark of every zip file.
+/// End of the file: the place of the directory in 64 bits, the place of that record, and the mark of every zip file.
 fn trailer(entries: u64, directory_bytes: u64, directory_offset: u64) -> Vec<u8> {
     let mut bytes = b"PK\x06\x06".to_vec();
     bytes.extend(44u64.to_le_bytes());

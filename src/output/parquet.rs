@@ -1,5 +1,5 @@
-//! Parquet: a column a quantity, of fixed-size lists where a draw has several values; the wavelengths and what the
-//! draws were made from as metadata.
+//! Parquet: a column per quantity, of fixed-size lists where a draw has several values, with the wavelengths, the
+//! model, the recipe and the seed as metadata.
 //!
 //! Parquet itself knows lists, but not that all are equally long: readers learn that from an Arrow schema in the
 //! metadata. The `parquet` crate would write it, but only with Arrow's arrays, which take four times as long to build
@@ -23,16 +23,16 @@ use super::Encoder;
 use super::schema::{Field, Schema};
 use crate::quantity::Dtype;
 
-/// About how many bytes a row group has. Groups are the same whatever the windows that came.
+/// Approximate size of a row group in bytes. Groups do not depend on the windows.
 const GROUP_BYTES: u64 = 16 << 20;
 
 pub(super) struct Parquet<W: Write + Send> {
     to: SerializedFileWriter<W>,
     schema: Schema,
-    /// The columns, as they are stored, of the row group that is being filled.
+    /// Columns, as they are stored, of the row group that is being filled.
     group: Vec<Vec<u8>>,
     group_rows: usize,
-    /// How many rows it has.
+    /// Number of rows in the row group.
     rows: usize,
 }
 
@@ -101,7 +101,7 @@ impl<W: Write + Send> Encoder for Parquet<W> {
     }
 }
 
-/// How many draws go through the crate's hands at once: their levels take as much memory as they do.
+/// Number of draws given to the crate at once: their levels take as much memory as they do.
 const BATCH_ROWS: usize = 4096;
 
 fn write_column(
@@ -138,7 +138,7 @@ fn write_values<T: DataType, const SIZE: usize>(
     Ok(())
 }
 
-/// The schema as Parquet knows it.
+/// Schema in Parquet's terms.
 fn root(fields: &[Field]) -> TypePtr {
     let fields = fields.iter().map(|field| {
         let name = if field.is_list() { "dtype" } else { &field.name };
@@ -173,12 +173,12 @@ fn nested(name: &str, repetition: Repetition, logical: Option<LogicalType>, of: 
     Arc::new(group.expect("the group is Parquet's"))
 }
 
-/// The place in a flatbuffer's table of the entry that a schema file declares as number `slot`.
+/// Offset in a flatbuffer's table of the entry that a schema file declares as number `slot`.
 const fn entry(slot: u16) -> u16 {
     4 + 2 * slot
 }
 
-/// The fields as Arrow's readers know them: an encapsulated message, in Base64.
+/// Fields in Arrow's terms: an encapsulated message, in Base64.
 fn arrow_schema(fields: &[Field], notes: &[(&str, String)]) -> String {
     const VERSION_5: i16 = 4;
     const SCHEMA: u8 = 1;
@@ -261,7 +261,7 @@ fn arrow_node(to: &mut FlatBufferBuilder, name: &str, kind: u8, of: Table, child
     to.end_table(node)
 }
 
-/// The error below, where it was one of writing.
+/// The I/O error within an error, or one around it.
 fn io_error(error: ParquetError) -> io::Error {
     match error {
         ParquetError::External(source) => match source.downcast::<io::Error>() {

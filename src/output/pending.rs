@@ -8,21 +8,22 @@ use tempfile::{NamedTempFile, TempDir};
 
 use super::OutputError;
 
-/// What the names of temporary files begin with.
+/// Prefix of the names of temporary files.
 pub(super) const PREFIX: &str = ".spectroll-";
 
 pub(super) const SUFFIX: &str = ".partial";
 
-/// What to do where something of the name exists.
+/// Treatment of a file or folder that exists already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IfExists {
-    /// Refuse.
+    /// Refuse to write.
     Refuse,
     /// Replace it, once the new one is complete.
     Replace,
 }
 
-/// A file on its way to a name: a temporary one beside it until [`PendingFile::finish`], and gone if that never comes.
+/// A file on its way to its name: a temporary one beside it until [`PendingFile::finish`], and deleted if that is
+/// never called.
 #[derive(Debug)]
 pub struct PendingFile {
     file: NamedTempFile,
@@ -49,7 +50,7 @@ impl PendingFile {
         }
     }
 
-    /// The file, to write to.
+    /// Opens the file for writing.
     pub fn file(&self) -> Result<File, OutputError> {
         self.file.as_file().try_clone().map_err(|source| self.failed(source))
     }
@@ -73,7 +74,7 @@ impl PendingFile {
         Ok(())
     }
 
-    /// An error of writing, with the name that was being written.
+    /// Makes an error of writing, with the name that was being written.
     pub fn failed(&self, source: io::Error) -> OutputError {
         OutputError::Write { path: self.path.clone(), source }
     }
@@ -182,7 +183,7 @@ pub(super) fn place(path: &Path, bytes: &[u8]) -> io::Result<()> {
     place_by(folder(path), PREFIX, path, bytes)
 }
 
-/// The same, by way of a temporary file in another folder whose name begins with `prefix`.
+/// Puts a whole file in place by way of a temporary file in the folder `by`, whose name begins with `prefix`.
 pub(super) fn place_by(by: &Path, prefix: &str, path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = temporary(by, prefix)?;
     file.write_all(bytes)?;
@@ -191,7 +192,7 @@ pub(super) fn place_by(by: &Path, prefix: &str, path: &Path, bytes: &[u8]) -> io
     Ok(())
 }
 
-/// A new temporary file of ours.
+/// Creates a temporary file.
 fn temporary(folder: &Path, prefix: &str) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(prefix).suffix(SUFFIX);
@@ -214,22 +215,22 @@ pub(super) fn sweep(folder: &Path, prefix: &str) -> io::Result<()> {
     Ok(())
 }
 
-/// What is gone already is not in the way.
+/// Ignores the error that a file does not exist.
 pub(super) fn ignore_missing(error: io::Error) -> io::Result<()> {
     if error.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(error) }
 }
 
-/// Puts the names in a folder on disk. Not every file system can say so, and the data are safe either way.
+/// Syncs the names in a folder to disk. Not every file system can, and the data are safe either way.
 pub(super) fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
-/// The folder that a path names a file in.
+/// Folder of the file that a path names.
 pub(super) fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// The folder that a path names a file in, which must exist.
+/// Folder of the file that a path names, which must exist.
 pub(super) fn existing_folder(path: &Path) -> Result<&Path, OutputError> {
     let folder = folder(path);
     if folder.is_dir() { Ok(folder) } else { Err(OutputError::NoFolder { folder: folder.to_owned() }) }

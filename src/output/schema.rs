@@ -1,4 +1,4 @@
-//! What a data set holds: columns of numbers, a row a draw, whatever they mean.
+//! Schema of a data set: columns of numbers, a row per draw, whatever they mean.
 
 use std::borrow::Cow;
 use std::io;
@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use crate::dataset::SpectrumKind;
 use crate::quantity::{Dtype, ValueRange};
 
-/// The value that bytes hold, as f64, which holds every one of these exactly.
+/// Decodes one value as f64, which holds values of every type exactly.
 fn read(dtype: Dtype, bytes: &[u8]) -> f64 {
     match dtype {
         Dtype::F16 => f16::from_le_bytes([bytes[0], bytes[1]]).to_f64(),
@@ -20,38 +20,39 @@ fn read(dtype: Dtype, bytes: &[u8]) -> f64 {
     }
 }
 
-/// One quantity of every draw.
+/// Column of a data set: one quantity of every draw.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Field {
-    /// Its name, such as `spectra`.
+    /// Name, such as `spectra`.
     pub name: String,
-    /// What its values run over, such as `wavelength`; `None` where a draw has one value, and the array one dimension.
+    /// Name of the axis of its values, such as `wavelength`; `None` where a draw has one value, and the array one
+    /// dimension.
     pub axis: Option<String>,
-    /// What a draw has several rows of such values of, and how many, such as the surfaces of a scene.
+    /// Name and extent of the axis of rows within a draw, where it has several, such as the surfaces of a scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outer: Option<(String, usize)>,
-    /// The names of the values along that axis, where each has one of its own, such as X, Y and Z.
+    /// Names of the values along `axis`, where each has one of its own, such as X, Y and Z.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub channels: Vec<String>,
-    /// How many values a draw has, in all its rows.
+    /// Number of values per draw, in all its rows.
     pub width: usize,
-    /// The type of the values as they are delivered.
+    /// Type of the values as delivered.
     #[serde(rename = "element")]
     pub dtype: Dtype,
-    /// The type that they are written as.
+    /// Type of the values as written.
     pub stored: Dtype,
-    /// What they are between, and stay between when they are rounded; `None` where that is not known.
+    /// Range of the values, which rounding preserves; `None` where it is not known.
     #[serde(default, rename = "interval", skip_serializing_if = "Option::is_none")]
     pub range: Option<ValueRange>,
 }
 
 impl Field {
-    /// A quantity of `width` values a draw, over `axis`.
+    /// Makes a field of `width` values per draw, along `axis`.
     pub fn vector(name: &str, axis: &str, width: usize, dtype: Dtype) -> Field {
         Field { width, axis: Some(axis.to_owned()), ..Field::scalar(name, dtype) }
     }
 
-    /// A quantity of one value a draw.
+    /// Makes a field of one value per draw.
     pub fn scalar(name: &str, dtype: Dtype) -> Field {
         let name = name.to_owned();
         Field {
@@ -66,12 +67,12 @@ impl Field {
         }
     }
 
-    /// The same for `count` rows a draw.
+    /// Returns the field with `count` rows per draw, along the axis `outer`.
     pub fn repeated(self, outer: &str, count: usize) -> Field {
         Field { width: self.width * count, outer: Some((outer.to_owned(), count)), ..self }
     }
 
-    /// The same, written as another type of float where it is one.
+    /// Returns the field written as the type `stored`, if its values are floats.
     pub fn stored_as(mut self, stored: Dtype) -> Field {
         if self.dtype != Dtype::U32 {
             self.stored = stored;
@@ -79,34 +80,34 @@ impl Field {
         self
     }
 
-    /// The same, with a name for each value along its axis.
+    /// Returns the field with a name for each value along its axis.
     pub fn with_channels(self, names: &[&str]) -> Field {
         Field { channels: names.iter().map(|name| (*name).to_owned()).collect(), ..self }
     }
 
-    /// The same, with values in an range.
+    /// Returns the field with values in a range.
     pub fn within(self, range: ValueRange) -> Field {
         Field { range: Some(range), ..self }
     }
 
-    /// The bytes of one draw as delivered.
+    /// Size of one draw as delivered, in bytes.
     pub fn delivered_bytes(&self) -> usize {
         self.width * self.dtype.size()
     }
 
-    /// The bytes of one draw as written.
+    /// Size of one draw as written, in bytes.
     pub fn stored_bytes(&self) -> usize {
         self.width * self.stored.size()
     }
 
-    /// The shape of `rows` draws.
+    /// Shape of the array of `rows` draws.
     pub fn shape(&self, rows: u64) -> Vec<u64> {
         let outer = self.outer.as_ref().map(|(_, count)| *count);
         let inner = self.axis.as_ref().map(|_| self.width / outer.unwrap_or(1).max(1));
         std::iter::once(rows).chain(outer.into_iter().chain(inner).map(|n| n as u64)).collect()
     }
 
-    /// The names of the dimensions, where a row is called `row`.
+    /// Names of the dimensions, the first of which is `row`.
     pub fn axes<'a>(&'a self, row: &'a str) -> Vec<&'a str> {
         let outer = self.outer.as_ref().map(|(name, _)| name.as_str());
         std::iter::once(row).chain(outer).chain(self.axis.as_deref()).collect()
@@ -117,7 +118,7 @@ impl Field {
         self.axis.is_some() || self.outer.is_some()
     }
 
-    /// Values as delivered, as they are to be written. An error says what does not fit the type.
+    /// Converts delivered values to the type in which they are written. An error names the value that does not fit.
     pub(super) fn store<'a>(&self, bytes: &'a [u8]) -> io::Result<Cow<'a, [u8]>> {
         if self.dtype == self.stored {
             return Ok(Cow::Borrowed(bytes));
@@ -150,7 +151,7 @@ impl Field {
         Ok(half)
     }
 
-    /// The values of delivered bytes.
+    /// Decodes delivered bytes.
     pub(super) fn values<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = f64> + use<'a> {
         let dtype = self.dtype;
         bytes.chunks_exact(dtype.size()).map(move |value| read(dtype, value))
@@ -160,19 +161,19 @@ impl Field {
 /// An array that all draws share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SharedArray {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its dimensions: their names and extents.
+    /// Dimensions: their names and extents.
     pub axes: Vec<(String, u64)>,
-    /// The type of its values.
+    /// Type of its values.
     #[serde(rename = "element")]
     pub dtype: Dtype,
-    /// Its values in C order. A set of chunks has them in a file of their own.
+    /// Values in C order. A set of chunks has them in a file of their own.
     #[serde(skip)]
     pub bytes: Vec<u8>,
 }
 
-/// Ignores the values, which a manifest does not hold: those of one description are the same.
+/// Compares descriptions and ignores values, which a manifest does not hold: those of one description are equal.
 impl PartialEq for SharedArray {
     fn eq(&self, other: &SharedArray) -> bool {
         (&self.name, &self.axes, self.dtype) == (&other.name, &other.axes, other.dtype)
@@ -180,7 +181,7 @@ impl PartialEq for SharedArray {
 }
 
 impl SharedArray {
-    /// The extents of its dimensions.
+    /// Extents of its dimensions.
     pub(super) fn shape(&self) -> Vec<u64> {
         self.axes.iter().map(|(_, extent)| *extent).collect()
     }
@@ -213,19 +214,19 @@ pub enum LrvLabel {
 /// What a data set holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Schema {
-    /// Its quantities, in the order in which their columns are delivered.
+    /// Fields, in the order in which their columns are delivered.
     pub fields: Vec<Field>,
-    /// What a draw is called: `draw`, or `scene` where it is one.
+    /// Name of a row: `draw`, or `scene` where it is one.
     #[serde(default = "draw")]
     pub row: String,
     /// Arrays that all draws share.
     #[serde(default, rename = "constants", skip_serializing_if = "Vec::is_empty")]
     pub shared: Vec<SharedArray>,
-    /// How many draws there are.
+    /// Number of draws.
     pub count: u64,
-    /// The wavelengths that the axis `wavelength` stands for, nm.
+    /// Wavelengths of the axis `wavelength`, nm.
     pub wavelengths: Vec<f64>,
-    /// What the draws were made from, for files that can say so.
+    /// Attributes for files that can hold them: the model, the recipe and the seed.
     pub attributes: Map<String, Value>,
 }
 
@@ -234,12 +235,12 @@ fn draw() -> String {
 }
 
 impl Schema {
-    /// The bytes of one draw as written.
+    /// Size of one draw as written, in bytes.
     pub fn row_bytes(&self) -> u64 {
         self.fields.iter().map(|field| field.stored_bytes() as u64).sum()
     }
 
-    /// How many draws a window of columns holds. They must agree.
+    /// Number of draws in a window of columns, which must agree.
     pub(super) fn rows(&self, columns: &[&[u8]]) -> usize {
         assert_eq!(columns.len(), self.fields.len(), "a column for each field");
         let mut rows = self.fields.iter().zip(columns).map(|(field, column)| {
@@ -251,13 +252,15 @@ impl Schema {
         first
     }
 
-    /// The only field, of a format that holds one.
+    /// The only field, for formats that hold one.
     pub(super) fn only_field(&self) -> &Field {
-        let [field] = self.fields.as_slice() else { panic!("the format holds one field: see Format::check") };
+        let [field] = self.fields.as_slice() else {
+            panic!("the format holds one field: see FileFormat::check")
+        };
         field
     }
 
-    /// The attributes as JSON text.
+    /// Attributes as JSON text.
     pub(super) fn attributes_text(&self) -> String {
         serde_json::to_string(&self.attributes).expect("maps of JSON are JSON")
     }

@@ -1,4 +1,4 @@
-//! A folder of text files, one a spectrum, as renderers read them: wavelength in nm and value on each line.
+//! A folder of text files, one per spectrum, as renderers read them: wavelength in nm and value on each line.
 //!
 //! Named as the method's authors named theirs, and numbered from 1: `illuminance_001.spd`, `reflectance_001.spd`, and
 //! `luminance-0.4000-reflectance-001.spd` where there is a target luminous reflectance. Scenes have a folder for each
@@ -18,13 +18,13 @@ use super::schema::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
 use super::{IfExists, OutputError};
 use crate::dataset::SpectrumKind;
 
-/// The most files that are written without being asked twice: folders of more are slow to open, and to delete.
+/// Largest number of files written without confirmation: folders of more are slow to open, and to delete.
 pub const MOST_FILES: u64 = 10_000;
 
 /// What tells our folders from others: nothing is in them but files of our names.
 const FOLDER: FolderMark = FolderMark { name: "a folder of .spd files of this program alone", is_ours };
 
-/// A folder on its way to a name.
+/// Writer of a folder that appears under its name only when it is complete.
 pub struct SpdFolder {
     pending: PendingFolder,
     schema: Schema,

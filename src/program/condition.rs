@@ -12,7 +12,7 @@ use crate::affine::Affine;
 /// Singular values below this part of the largest do not count: the tristimulus values do not vary freely.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// What giving tristimulus values does to the normals of a model.
+/// Effect of given tristimulus values on the normals of a model.
 #[derive(Clone, Debug)]
 pub(crate) struct Condition {
     /// a, the tristimulus values at z = 0.

@@ -1,6 +1,6 @@
-//! The set of acceptable draws, before any is made: whether it is empty, and how light a reflectance can be.
+//! Feasibility of draws before any is made: whether any is acceptable, and how light a reflectance can be.
 //!
-//! Every rule is linear in the standard normals z, so what is accepted is a polytope, and a small linear program
+//! All bounds are linear in the standard normals z, so the accepted region is a polytope, and a small linear program
 //! answers exactly what a pilot run could only suspect. Points beyond [`REACH`] standard deviations are left out:
 //! their mass is below 1e-37 a component. The room is the radius of the largest ball of acceptable z, in standard
 //! deviations: a set without volume is empty.
@@ -15,7 +15,7 @@ use crate::dataset::SpectrumKind;
 /// Coefficients of unit rows below this are dropped: together they move no bound by 1e-7, the solver's tolerance.
 const NEGLIGIBLE: f64 = 1e-12;
 
-/// What room a set of half-spaces leaves.
+/// Room that a set of half-spaces leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Room {
     /// The largest ball within all of them, in standard deviations.

@@ -3,8 +3,8 @@
 //! Everything that does not depend on the random words is folded here, in f64. A spectrum is linear in the k standard
 //! normals z of a candidate, and so is all that is linear in a spectrum: weights, tristimulus values, luminous
 //! reflectance. Each is an [`Affine`] map of z, with the weights' mean in its offset and the covariance's factor and
-//! scale in its gains. What is left of a draw is one rule that the spectrum must obey, and one factor that scales it.
-//! The shader and the CPU engine both work from this, and round it once.
+//! scale in its gains. All else in a draw is one pair of bounds that the spectrum must meet, and one factor that
+//! scales it. The shader and the CPU engine both work from this, and round it once.
 
 pub(crate) mod condition;
 pub(crate) mod feasibility;
@@ -19,23 +19,23 @@ use crate::dataset::SpectrumKind;
 use crate::model::Model;
 use crate::quantity::{ArrayFormat, ValueRange};
 
-/// What a map of z is multiplied by.
+/// Factor of a map of z.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Unit {
-    /// 1.
+    /// One.
     One,
-    /// What the spectrum is scaled by.
+    /// The scale of the spectrum.
     Scale,
     /// The reciprocal of the first value of another map.
     Over(Affine),
 }
 
-/// Where a quantity comes from.
+/// Source of a quantity's values.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Source {
     /// The spectrum, scaled.
     Spectrum,
-    /// A map of z, and what multiplies it.
+    /// A map of z, and its factor.
     Map(Affine, Unit),
     /// The intensity of the draw.
     Intensity,
@@ -45,14 +45,14 @@ pub(crate) enum Source {
     Status,
 }
 
-/// A quantity that comes out.
+/// A quantity that a draw gives.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Output {
     pub(crate) format: ArrayFormat,
     pub(crate) source: Source,
 }
 
-/// What one draw computes. n bands, k components.
+/// Everything that one draw computes, for n bands and k components. n bands, k components.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Program {
     pub(crate) kind: SpectrumKind,
@@ -60,16 +60,16 @@ pub(crate) struct Program {
     pub(crate) spectrum: Affine,
     pub(crate) target: Option<LrvTarget>,
     pub(crate) intensity: Option<IntensityLaw>,
-    /// What proposes candidates, where it is not plain rejection: z is then what it gives, and all maps are of that.
+    /// Source of candidates, where it is not plain rejection: z is then in its coordinates, and so are all maps.
     pub(crate) proposal: Option<BoxMixture<f64>>,
-    /// How many candidates a draw may take, at least 1 and less than 2^31.
+    /// Largest number of candidates of a draw, at least 1 and less than 2^31.
     pub(crate) max_attempts: u32,
-    /// What comes out, in the order of [`Quantity`](crate::Quantity), each once.
+    /// Outputs, in the order of [`Quantity`](crate::Quantity), each once.
     pub(crate) outputs: Vec<Output>,
 }
 
 impl Program {
-    /// Draws of a model with these weights that are physical, of which nothing comes out yet.
+    /// Makes a program for physical draws of a model with these weights, without outputs.
     pub(crate) fn new(model: &Model, weights: &Affine) -> Program {
         let parts = model.parts();
         let columns: Vec<_> =
@@ -87,12 +87,12 @@ impl Program {
         }
     }
 
-    /// The same with every spectrum multiplied by `intensity`.
+    /// Returns the program with every spectrum multiplied by `intensity`.
     pub(crate) fn brightened(self, intensity: f64) -> Program {
         Program { spectrum: self.spectrum.scaled(intensity), ..self }
     }
 
-    /// The same draws from the candidates of a cover.
+    /// Returns the program with candidates from a cover.
     pub(crate) fn covered(self, cover: &Cover) -> Program {
         let frame = cover.frame();
         let turned = |source| match source {
@@ -107,7 +107,7 @@ impl Program {
         Program { spectrum, outputs, proposal: Some(cover.proposal().clone()), ..self }
     }
 
-    /// The same with tallies among what comes out.
+    /// Returns the program with statuses among its outputs.
     pub(crate) fn with_status(&self) -> Program {
         let format = ArrayFormat::status();
         let mut outputs = self.outputs.clone();
@@ -118,7 +118,7 @@ impl Program {
         Program { outputs, ..self.clone() }
     }
 
-    /// The same with nothing but spectra coming out.
+    /// Returns the program with spectra as its only output.
     pub(crate) fn spectra_alone(&self) -> Program {
         let format = ArrayFormat::spectra(self.bands());
         Program { outputs: vec![Output { format, source: Source::Spectrum }], ..self.clone() }

@@ -1,4 +1,4 @@
-//! The rule that a spectrum must meet, and the factor that scales it.
+//! Bounds that a spectrum must meet, and the factor that scales it.
 
 use std::collections::HashMap;
 use std::iter;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::affine::Affine;
 
-/// What must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance.
+/// Spectrum that must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance (LRV).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -33,8 +33,8 @@ pub(crate) struct LrvTarget {
 }
 
 impl LrvTarget {
-    /// The same for these spectra, with the weights of bands that are alike on the first of them. A driver may take
-    /// v s + w s for (v + w) s, which rounds otherwise.
+    /// Returns the target for these spectra, with the weights of bands that are alike on the first of them. A driver
+    /// may take v s + w s for (v + w) s, which rounds otherwise.
     pub(crate) fn of_unlike_bands(mut self, spectrum: &Affine) -> LrvTarget {
         let mut first = HashMap::new();
         for (band, offset) in spectrum.offset.iter().enumerate() {

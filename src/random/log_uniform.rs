@@ -1,10 +1,10 @@
-//! Uniform numbers and powers of two, of which log-uniform numbers are made. GPU twin: `shaders/log_uniform.wgsl`.
+//! Uniform numbers and powers of two, from which log-uniform numbers are made. GPU twin: `shaders/log_uniform.wgsl`.
 //!
 //! As with the normals, the exponential in f32 is a polynomial of our own: the shader's twin, to the bit.
 
 use std::f32::consts::LN_2;
 
-/// (x + 1/2) 2^-32: in (0, 1], for the last few words round to 1.
+/// The uniform number (x + 1/2) 2^-32 of a word, in (0, 1]: for the last few words it rounds to 1.
 #[inline(always)]
 pub(crate) fn uniform(word: u32) -> f32 {
     (word as f32 + 0.5) * 2.3283064e-10

@@ -1,5 +1,5 @@
-//! Random words and what they become: Philox counters, streams of them, and normals, truncated normals and log-uniform
-//! numbers by polynomials of our own. A shader fragment of the same name is each one's twin, to the bit.
+//! Random words and their transforms: Philox counters, streams of them, and normals, truncated normals and
+//! log-uniform numbers by polynomials of our own. A shader fragment of the same name is each one's twin, to the bit.
 
 pub(crate) mod log_uniform;
 pub(crate) mod normal;

@@ -1,4 +1,4 @@
-//! Box-Muller: two uniform words to two standard normals. GPU twin: `shaders/normal.wgsl`.
+//! Box-Muller transform: two uniform words to two standard normals. GPU twin: `shaders/normal.wgsl`.
 //!
 //! In f32 the logarithm, sine and cosine are polynomials in + - * alone, the same operations in the same order as in
 //! the shader: an adapter that does not fuse multiply and add (Mesa's lavapipe is one) gives the same bits. WGSL's
@@ -84,7 +84,7 @@ mod tests {
 
     use super::*;
 
-    /// What no word exceeds.
+    /// Bounds on the errors, which no word exceeds.
     const RADIUS_ERROR: f64 = 5.4e-7;
     const RADIUS_RELATIVE_ERROR: f64 = 1.4e-7;
     const CIRCLE_ERROR: f64 = 1.3e-7;

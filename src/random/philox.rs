@@ -1,19 +1,19 @@
-//! Philox4x32-10: four random words as a pure function of a counter and a key, so any word is had at once, by any
-//! thread (Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy as 1, 2, 3", 2011). GPU twin:
-//! `shaders/philox.wgsl`. What the counter holds is in [`crate::random::stream`].
+//! Philox4x32-10: four random words as a pure function of a counter and a key, so any thread can compute any word at
+//! once (Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy as 1, 2, 3", 2011). GPU twin:
+//! `shaders/philox.wgsl`. [`crate::random::stream`] says what the counter holds.
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: u32 = 10;
 
-/// Four random words of a counter and a key.
+/// Returns four random words of a counter and a key.
 pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     philox_in_lanes(counter.map(|word| [word]), key).map(|[word]| word)
 }
 
-/// The same for L counters under one key, word by word: each step is a loop over lanes, for the compiler to
-/// vectorise. Words are kept in the low halves of 64 bits, as vector units multiply them; what the high halves hold
-/// counts for nothing, and is not cleared.
+/// Returns the random words of L counters under one key, word by word: each step is a loop over lanes, for the
+/// compiler to vectorise. Words are kept in the low halves of 64 bits, as vector units multiply them; the high halves
+/// are neither used nor cleared.
 #[inline(always)]
 #[allow(clippy::needless_range_loop)] // a lane is an index, of several arrays at once
 pub(crate) fn philox_in_lanes<const L: usize>(counters: [[u32; L]; 4], key: [u32; 2]) -> [[u32; L]; 4] {
@@ -42,7 +42,7 @@ pub(crate) fn philox_in_lanes<const L: usize>(counters: [[u32; L]; 4], key: [u32
     words
 }
 
-/// That of the low halves.
+/// Product of the low halves.
 #[inline(always)]
 fn product(a: u32, b: u64) -> u64 {
     u64::from(a) * u64::from(b as u32)

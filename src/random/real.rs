@@ -1,4 +1,4 @@
-//! What draws can be computed in: f32, in which the shader computes them too, or f64, for the oracle that judges both.
+//! Number types in which draws are computed: f32, as in the shader, or f64, for the oracle that judges both.
 
 use std::ops::{Add, Div, Mul};
 
@@ -12,26 +12,26 @@ pub trait Real: Arithmetic {
     fn normal_pair(x: u32, y: u32) -> [Self; 2];
 }
 
-/// The steps of a draw. What else a type would need is nobody's to implement but ours.
+/// Arithmetic of a draw, in a trait of its own that seals [`Real`]: only f32 and f64 have it.
 pub trait Arithmetic:
     Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Send + Sync + 'static
 {
-    /// 0.
+    /// Zero.
     const ZERO: Self;
-    /// 1.
+    /// One.
     const ONE: Self;
     /// Infinity.
     const INFINITY: Self;
-    /// What a divisor is raised to where it might not be positive.
+    /// Smallest divisor, in place of one that might not be positive.
     const FLOOR: Self;
-    /// The nearest value.
+    /// The nearest value of this type.
     fn from_f64(value: f64) -> Self;
     /// The uniform number (x + 1/2) 2^-32 of a word.
     fn uniform(x: u32) -> Self;
-    /// 2 to this power, which is between 0 and 126.
+    /// 2 to a power between 0 and 126.
     fn exp2(self) -> Self;
-    /// A coordinate of a box, of a uniform word: relative to a centre, and what it costs. The four numbers of an axis
-    /// and the cost are those of `src/truncated.rs`.
+    /// A coordinate of a box from a uniform word, relative to a centre, and its cost. The four numbers of an axis and
+    /// the cost are those of `src/random/truncated.rs`.
     fn truncated(axis: [Self; 4], word: u32) -> [Self; 2];
     /// -2 ln u of a uniform word u: a chi-square of two degrees of freedom.
     fn chi_square(word: u32) -> Self;

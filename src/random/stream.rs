@@ -1,4 +1,4 @@
-//! Streams of random words, and which of their draws are meant.
+//! Streams of random words, and ranges of their draws.
 //!
 //! Draw i is a pure function of the model, the recipe, the seed, the stream and i. The generator's key is the seed
 //! (low word, high word); its counter is (i low, i high, attempt, stream << 8 | block). Attempts 0, 1, 2, ... are the
@@ -28,7 +28,7 @@ const RNG_BLOCK: u32 = 254;
 pub struct Stream {
     seed: u64,
     id: u32,
-    /// How many draws a row has; 0 where there are no rows.
+    /// Number of draws in a row; 0 where there are no rows.
     row: u32,
 }
 
@@ -46,8 +46,8 @@ impl Stream {
         Stream { seed, id: (hash >> 24) ^ (hash & 0x00FF_FFFF), row: 0 }
     }
 
-    /// The same stream, in rows of `length` draws: index i is then draw i % length of row i / length, and what that
-    /// draw is does not depend on the length.
+    /// Arranges the stream's draws in rows of `length`: index i is then draw i % length of row i / length, which does
+    /// not depend on the length.
     ///
     /// ```
     /// use spectroll::Stream;
@@ -123,7 +123,7 @@ impl Stream {
     }
 }
 
-/// Where the words of candidates come from, one in each of L lanes. A trait and not a closure, which could not be told to
+/// Source of the words of candidates, one in each of L lanes. A trait and not a closure, which could not be told to
 /// be inlined: what is not inlined is compiled for the least of all machines, and at a fraction of the speed.
 pub(crate) trait Blocks<const L: usize> {
     /// The four words of a block, below 256.
@@ -161,25 +161,25 @@ fn words(x: u64) -> [u32; 2] {
     [x as u32, (x >> 32) as u32]
 }
 
-/// Which draws: `count` of them, from index `first` of a stream on.
+/// A range of `count` draws, from index `first` of a stream on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DrawRange {
-    /// Where their words come from.
+    /// Source of their random words.
     pub stream: Stream,
-    /// The index of the first.
+    /// Index of the first draw.
     pub first: u64,
-    /// How many there are. Indices are 64-bit numbers, and those beyond the last follow as 0, 1, ...
+    /// Number of draws. Indices are 64-bit numbers, and those beyond the last follow as 0, 1, ...
     pub count: u64,
 }
 
 impl DrawRange {
-    /// The part of these that starts `offset` draws in and has `count` of them.
+    /// The part of the range that starts `offset` draws in and has `count` of them.
     pub(crate) fn part(&self, offset: u64, count: u64) -> DrawRange {
         DrawRange { first: self.first.wrapping_add(offset), count, ..*self }
     }
 }
 
-/// `rand`'s generator trait over a [`Stream`]: 2^66 words before it repeats.
+/// Generator for `rand`'s traits over a [`Stream`]: 2^66 words before it repeats.
 #[derive(Clone, Debug)]
 pub struct StreamRng {
     stream: Stream,

@@ -1,4 +1,4 @@
-//! From what is asked for to a recipe, if it can be drawn.
+//! Construction of recipes, and the checks that they can be drawn.
 
 use super::outputs::{OutputRequest, outputs};
 use super::pilot::{TOLERABLE_FAILURE, failure, pilot, pilot_of_draws};
@@ -46,21 +46,21 @@ impl RecipeBuilder {
         }
     }
 
-    /// The quantities that come out, at least one; [`Quantity::Spectra`] unless said. Engines add
+    /// Sets the quantities of each draw, at least one; [`Quantity::Spectra`] unless set. Engines add
     /// [`Quantity::Attempts`].
     pub fn quantities(mut self, quantities: impl IntoIterator<Item = Quantity>) -> Self {
         self.outputs.quantities = quantities.into_iter().collect();
         self
     }
 
-    /// How quantities with several values a draw are ordered ([`Layout::Rows`]).
+    /// Sets the order of the values of quantities that have several per draw ([`Layout::Rows`]).
     pub fn layout(mut self, layout: Layout) -> Self {
         self.outputs.layout = layout;
         self
     }
 
-    /// The type of the spectra ([`Dtype::F32`]). In [`Dtype::F16`] they are rounded to nearest and ties to even, but never
-    /// to an end of their [`ValueRange`]; above 65,504 they are infinite. Other quantities stay in 32 bits.
+    /// Sets the type of the spectra ([`Dtype::F32`]). In [`Dtype::F16`] they are rounded to nearest and ties to even,
+    /// but never to an end of their [`ValueRange`]; above 65,504 they are infinite. Other quantities stay in 32 bits.
     ///
     /// [`ValueRange`]: crate::ValueRange
     pub fn spectra_dtype(mut self, dtype: Dtype) -> Self {
@@ -74,7 +74,7 @@ impl RecipeBuilder {
         self
     }
 
-    /// The scale of an illuminant's XYZ and linear sRGB ([`XyzScale::Absolute`]).
+    /// Sets the scale of an illuminant's XYZ and linear sRGB ([`XyzScale::Absolute`]).
     pub fn xyz_scale(mut self, scale: XyzScale) -> Self {
         self.outputs.xyz_scale = Some(scale);
         self
@@ -117,7 +117,7 @@ impl RecipeBuilder {
         RecipeBuilder { xyz: Some(xyz), ..self }
     }
 
-    /// What must lie between 0 and 1 where there is a target LRV ([`Bounds::Base`]).
+    /// Sets the spectrum that must lie between 0 and 1 where there is a target LRV ([`Bounds::Base`]).
     pub fn bounds(self, bounds: Bounds) -> Self {
         RecipeBuilder { bounds: Some(bounds), ..self }
     }
@@ -127,18 +127,18 @@ impl RecipeBuilder {
         RecipeBuilder { covariance_scale, ..self }
     }
 
-    /// Where candidates come from ([`ProposalKind::Auto`]).
+    /// Sets the source of candidates ([`ProposalKind::Auto`]).
     pub fn proposal(self, proposal: ProposalKind) -> Self {
         RecipeBuilder { proposal, ..self }
     }
 
-    /// How many candidates a draw may take ([`DEFAULT_MAX_ATTEMPTS`]).
+    /// Sets the largest number of candidates of a draw ([`DEFAULT_MAX_ATTEMPTS`]).
     pub fn max_attempts(self, max_attempts: u32) -> Self {
         RecipeBuilder { max_attempts, ..self }
     }
 
-    /// The recipe, if it can be drawn: its values make sense, a linear program finds room for a spectrum, and a pilot
-    /// run finds enough of it.
+    /// Builds the recipe, if it can be drawn: its values make sense, a linear program finds room for a spectrum, and
+    /// a pilot run accepts enough candidates.
     pub fn build(self) -> Result<Recipe, RecipeError> {
         let program = self.program()?;
         let half_spaces = feasibility::half_spaces(&program);
@@ -201,7 +201,7 @@ impl RecipeBuilder {
         Ok(program)
     }
 
-    /// The middle of what the rule of a program accepts; `None` where that is for the pilot run to find out.
+    /// A point in the middle of the accepted region; `None` where that is for the pilot run to find out.
     fn centre(&self, program: &Program, half_spaces: &[HalfSpace]) -> Result<Option<Vec<f64>>, RecipeError> {
         if let Some(target) = &program.target {
             let lrv = target.lrv.largest();

@@ -1,11 +1,11 @@
-//! Why a recipe cannot be drawn.
+//! Errors of recipes.
 
 use super::pilot::{PILOT, TOLERABLE_FAILURE, failure};
 use crate::cover::MOST_COMPONENTS;
 use crate::grid::Grid;
 use crate::quantity::Quantity;
 
-/// Why a recipe cannot be drawn.
+/// Error returned by [`RecipeBuilder::build`](crate::RecipeBuilder::build).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are

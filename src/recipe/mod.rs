@@ -26,10 +26,10 @@ use crate::random::real::Real;
 use crate::random::stream::Stream;
 use crate::wgsl::{self, WgslError};
 
-/// How many candidates a draw may take unless asked otherwise.
+/// Default limit on the number of candidates of a draw.
 pub const DEFAULT_MAX_ATTEMPTS: u32 = 1 << 16;
 
-/// A model, and what its draws must obey. See [`Recipe::builder`].
+/// A model with the settings of its draws. See [`Recipe::builder`].
 #[derive(Clone, Debug)]
 pub struct Recipe {
     model: Model,
@@ -51,12 +51,12 @@ pub struct CoverSize {
     pub bytes: usize,
 }
 
-/// Where candidates come from. The draws have the same distribution either way, but are not the same draws.
+/// Source of candidates. The draws have the same distribution either way, but are not the same draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum ProposalKind {
-    /// Whatever is expected to cost less.
+    /// Whichever is expected to cost less.
     #[default]
     Auto,
     /// The model's Gaussian, as in the appendix: right where a good part of it is acceptable.
@@ -101,12 +101,12 @@ impl From<Range<f64>> for Lrv {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intensity {
-    /// This.
+    /// A fixed factor.
     Fixed(f64),
-    /// Something between the two, uniform in its logarithm, for each draw.
+    /// A factor between the two for each draw, uniform in its logarithm.
     LogUniform(f64, f64),
-    /// For each draw one of what the model's data were divided by before the fit, each as likely: their mean powers,
-    /// unless the fit says otherwise.
+    /// For each draw a divisor of one of the model's spectra, chosen at random: the spectra's mean powers, unless the
+    /// fit was normalized otherwise.
     Data,
 }
 
@@ -176,13 +176,13 @@ impl Recipe {
         self.acceptance
     }
 
-    /// The probability that a spectrum of the model obeys the rule, which is the share that plain rejection accepts;
+    /// The probability that a spectrum of the model is accepted, which is the acceptance of plain rejection;
     /// estimated from as many candidates.
     pub fn probability(&self) -> f64 {
         self.probability
     }
 
-    /// Where candidates come from; never [`ProposalKind::Auto`].
+    /// Source of candidates; never [`ProposalKind::Auto`].
     pub fn proposal(&self) -> ProposalKind {
         if self.cover.is_some() { ProposalKind::Cover } else { ProposalKind::Plain }
     }
@@ -192,32 +192,33 @@ impl Recipe {
         self.cover
     }
 
-    /// What the values of its spectra are between.
+    /// Range of values that its spectra may take.
     pub fn value_range(&self) -> ValueRange {
         self.program.value_range()
     }
 
-    /// What comes out, and how it lies in memory, in the order of [`Quantity`](crate::Quantity).
+    /// Formats of its quantities, in the order of [`Quantity`](crate::Quantity).
     pub fn formats(&self) -> Vec<ArrayFormat> {
         self.program.outputs.iter().map(|output| output.format).collect()
     }
 
-    /// Gets ready to draw one at a time, on the CPU: for a few draws, for tests, and for code that lives in `rand`.
+    /// Prepares to draw one at a time, on the CPU: for a few draws, for tests, and for code that lives in `rand`.
     pub fn scalar_sampler<R: Real>(&self) -> ScalarSampler<R> {
         ScalarSampler::new(self)
     }
 
-    /// Draw `index` of a stream, as [`ScalarSampler::draw`] makes it, which is what to use for more than one.
+    /// Makes draw `index` of a stream. For more than one, [`ScalarSampler::draw`] is faster.
     pub fn draw<R: Real>(&self, stream: Stream, index: u64) -> Draw<R> {
         self.scalar_sampler().draw(stream, index)
     }
 
-    /// The draw as a WGSL module without bindings or entry points, for shaders of a host on any version of wgpu or any
-    /// other engine. Every name has `prefix` and an underscore before it, so that several recipes fit in one shader:
+    /// Writes the draw as a WGSL module without bindings or entry points, for shaders of a host on any version of
+    /// wgpu or any other engine. Every name has `prefix` and an underscore before it, so that several recipes fit in
+    /// one shader:
     ///
     /// - `PREFIX_draw(seed: vec2<u32>, index: vec2<u32>) -> PREFIX_Draw` makes the same draw as every engine. Its
-    ///   member `attempts` is how many candidates that took, 0 where it failed; the rest is for the functions below.
-    ///   `PREFIX_draw_in(stream, seed, index)` makes that of a [`Stream`] by its number.
+    ///   member `attempts` is the number of candidates that took, 0 where it failed; the rest is for the functions below.
+    ///   `PREFIX_draw_in(stream, seed, index)` draws from a [`Stream`], given its number.
     /// - for spectra, `PREFIX_at(draw, band) -> f32` and `PREFIX_spectrum(draw) -> array<f32, bands>`;
     /// - for weights, `PREFIX_weights(draw) -> array<f32, components>`;
     /// - for XYZ and linear sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_linear_srgb`;

@@ -1,4 +1,4 @@
-//! From the quantities that a recipe asks for to what computes them: each as a map of the normals, folded in f64.
+//! Outputs of a program from the quantities that a recipe asks for: each as a map of the normals, folded in f64.
 
 use super::{Illuminant, RecipeError, XyzScale};
 use crate::affine::Affine;
@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::program::{LrvLaw, Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity};
 
-/// What a recipe asks for.
+/// Quantities that a recipe asks for, and their settings.
 #[derive(Clone, Debug)]
 pub(crate) struct OutputRequest {
     pub(crate) quantities: Vec<Quantity>,
@@ -35,7 +35,7 @@ impl Default for OutputRequest {
     }
 }
 
-/// What comes out of a program of these weights, each quantity once and in their order.
+/// Makes the outputs of a program of these weights, each quantity once and in their order.
 pub(crate) fn outputs(
     asked: &OutputRequest,
     model: &Model,

@@ -1,4 +1,4 @@
-//! A pilot run, which estimates before any work starts how many candidates are accepted.
+//! Pilot run, which estimates the acceptance before any work starts.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use crate::cpu::Kernel;
 use crate::program::Program;
 use crate::random::stream::Stream;
 
-/// How many candidates estimate the acceptance before any work starts.
+/// Number of candidates of a pilot run.
 pub(super) const PILOT: u64 = 1 << 16;
 
 /// How many whole draws estimate it at least: enough for 1 part in 10, at some 10^6 candidates in the worst case.

@@ -11,7 +11,7 @@ use crate::random::real::Real;
 use crate::random::stream::{DRAW_BLOCK, Stream};
 
 /// Draws of a recipe, one at a time: in f32 as every engine makes them, in f64 without their rounding errors. See
-/// [`Recipe::scalar`].
+/// [`Recipe::scalar_sampler`](crate::Recipe::scalar_sampler).
 ///
 /// It is also a distribution for code that lives in `rand`: the words then come from any generator, two for each two
 /// normals, rather than from a counter; everything else is the same. See also [`Stream::rng`].
@@ -37,7 +37,7 @@ impl<R: Real> ScalarSampler<R> {
         ScalarSampler { kernel: Kernel::new(program), quantities }
     }
 
-    /// Draw `index` of a stream.
+    /// Makes draw `index` of a stream.
     pub fn draw(&self, stream: Stream, index: u64) -> Draw<R> {
         self.drawn(self.kernel.draw(stream, index))
     }
@@ -72,7 +72,7 @@ pub struct Draw<R> {
 }
 
 impl<R> Draw<R> {
-    /// What it took.
+    /// Status of the draw.
     pub fn status(&self) -> DrawStatus {
         self.status
     }

@@ -1,4 +1,4 @@
-//! What a recipe asks for, in a form that can be written down and read back.
+//! Settings of a recipe, in a form that can be written down and read back.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,12 +19,12 @@ pub struct RecipeSettings {
     /// The target tristimulus values under D65.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub xyz: Option<[f64; 3]>,
-    /// What must lie between 0 and 1 where there is a target LRV.
+    /// Spectrum that must lie between 0 and 1 where there is a target LRV.
     pub bounds: Bounds,
     /// The factor of the weights' covariance.
     #[serde(rename = "cov_scale")]
     pub covariance_scale: f64,
-    /// What illuminants are multiplied by.
+    /// Factor of illuminants.
     pub intensity: Option<Intensity>,
     /// The quantities of each draw.
     pub quantities: Vec<Quantity>,
@@ -32,7 +32,7 @@ pub struct RecipeSettings {
     pub illuminant: Illuminant,
     /// The scale of illuminants' XYZ and linear sRGB.
     pub xyz_scale: XyzScale,
-    /// Where candidates come from, as it was asked for.
+    /// Source of candidates, as it was asked for.
     pub proposal: ProposalKind,
     /// The most candidates that a draw may take.
     pub max_attempts: u32,
@@ -117,7 +117,7 @@ impl From<Lrv> for LrvRecord {
 mod tests {
     use super::*;
 
-    /// What `verify` reads in sets of earlier runs.
+    /// Names that `verify` reads in sets of earlier runs.
     #[test]
     fn serialised_names_stay() {
         let plain = serde_json::to_string(&RecipeSettings::default()).unwrap();

@@ -1,4 +1,4 @@
-//! What can be wrong with a scene: what, where, and what to do.
+//! Errors of scenes: the problem, its place, and the remedy.
 
 use std::fmt;
 
@@ -18,7 +18,7 @@ pub struct SceneError {
     problem: Box<SceneErrorKind>,
 }
 
-/// Where something is wrong.
+/// Place of an error.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SceneErrorPlace {
     /// The file, where there is one.
@@ -31,7 +31,7 @@ pub struct SceneErrorPlace {
     pub key: String,
 }
 
-/// What is wrong. The messages say what to do about it.
+/// Kind of an error. The messages say what to do about it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -142,12 +142,12 @@ impl SceneError {
         SceneError { place, problem: Box::new(problem) }
     }
 
-    /// Where something is wrong.
+    /// Place of the error.
     pub fn place(&self) -> &SceneErrorPlace {
         &self.place
     }
 
-    /// What is wrong there.
+    /// Kind of the error.
     pub fn problem(&self) -> &SceneErrorKind {
         &self.problem
     }

@@ -119,17 +119,17 @@ impl Scene {
     }
 }
 
-/// Where the keys of a table are.
+/// Places of a table's keys.
 type Spans = Vec<(String, Range<usize>)>;
 
-/// What a file says.
+/// Contents of a file.
 struct File {
     builder: SceneBuilder,
     spans: Spans,
     groups: Vec<Located>,
 }
 
-/// Where a group is.
+/// Place of a group.
 struct Located {
     header: Range<usize>,
     spans: Spans,
@@ -137,7 +137,7 @@ struct Located {
 
 struct Reader<'a> {
     folder: &'a Path,
-    /// Those that were read.
+    /// Models that were read.
     models: HashMap<String, Model>,
 }
 
@@ -228,7 +228,7 @@ impl Reader<'_> {
         Ok(Targets { base, aim, bounds, copies })
     }
 
-    /// What all groups have. Targets have a count unless one is said, and flat ones need no model.
+    /// Settings that all groups have. Targets have a count unless one is said, and flat ones need no model.
     fn base(&mut self, section: &Section, target: Option<(u64, bool)>) -> Result<Base, Wrong> {
         let name = section.need("name", "name = \"background\"")?.text()?;
         let model = match (section.get("model"), target) {

@@ -1,11 +1,11 @@
-//! What a scene is made of: groups of illuminants, of surfaces and of targets.
+//! Groups of a scene: illuminants, surfaces and targets.
 
 use crate::model::Model;
 use crate::program::Bounds;
 use crate::quantity::Quantity;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
 
-/// What the groups of all kinds have.
+/// Settings that groups of all kinds have.
 #[derive(Clone, Debug)]
 pub(super) struct Base {
     pub(super) name: String,
@@ -31,14 +31,14 @@ pub struct Illuminants {
     pub(super) same_shape: bool,
 }
 
-/// Reflectances, so many in each scene.
+/// Group of reflectances, with their number in each scene.
 #[derive(Clone, Debug)]
 pub struct Surfaces {
     pub(super) base: Base,
     pub(super) fixed: bool,
 }
 
-/// Reflectances that have something given.
+/// Group of reflectances with a constraint, such as a luminous reflectance.
 #[derive(Clone, Debug)]
 pub struct Targets {
     pub(super) base: Base,
@@ -54,11 +54,11 @@ pub enum Group {
     Illuminants(Illuminants),
     /// Reflectances.
     Surfaces(Surfaces),
-    /// Reflectances that have something given.
+    /// Reflectances with a constraint.
     Targets(Targets),
 }
 
-/// Whose an intensity is.
+/// Scope of an intensity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntensityScope {
     /// Each light has its own.
@@ -67,15 +67,16 @@ pub enum IntensityScope {
     Scene,
 }
 
-/// What is given of a target.
+/// Constraint on a target.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TargetConstraint {
-    /// The luminous reflectance value (LRV), to which the spectrum is scaled (eq. 9, 10).
+    /// Luminous reflectance (LRV: CIE Y of the 1931 2 degree observer under D65, perfect white = 1), to which the
+    /// spectrum is scaled (eq. 9, 10).
     Lrv(LrvLevels),
     /// The tristimulus values under D65, where a perfect white has Y = 1: see
     /// [`RecipeBuilder::xyz`](crate::RecipeBuilder::xyz).
     Xyz([f64; 3]),
-    /// The same, by hue.
+    /// Tristimulus values under D65 by hue.
     Hue(Hue),
     /// All: the spectrum is its LRV in every band.
     Flat(LrvLevels),
@@ -84,7 +85,7 @@ pub enum TargetConstraint {
 /// Luminous reflectance values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LrvLevels {
-    /// These in turn: scene s has number s modulo how many there are.
+    /// These levels in turn: scene s has number s modulo their number.
     Each(Vec<f64>),
     /// For each target its own, uniform between these.
     Uniform(f64, f64),
@@ -93,7 +94,7 @@ pub enum LrvLevels {
 /// Colours in the hexcone of HSV, whose red, green and blue are linear Rec. 709 components here.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hue {
-    /// How many hues there are, at equal steps from red on: scene s has number s modulo this.
+    /// Number of hues, at equal steps from red on: scene s has number s modulo this.
     pub levels: u32,
     /// The saturation of each target is uniform between these.
     pub saturation: (f64, f64),
@@ -101,7 +102,7 @@ pub struct Hue {
     pub lightness: (f64, f64),
 }
 
-/// What the targets of different levels have in common.
+/// Relation of the targets of different levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Copies {
     /// Nothing: each is a draw of its own.
@@ -122,7 +123,7 @@ impl LrvLevels {
         LrvLevels::Each((0..levels).map(|level| from + step * f64::from(level)).collect())
     }
 
-    /// That of a scene, where `uniform` is between 0 and 1.
+    /// Level of a scene, where `uniform` is between 0 and 1.
     pub(super) fn at(&self, scene: u64, uniform: impl FnOnce() -> f64) -> f64 {
         match self {
             LrvLevels::Each(levels) => levels[(scene % levels.len() as u64) as usize],
@@ -154,7 +155,7 @@ macro_rules! base {
                 self
             }
 
-            /// How many candidates a draw may take ([`DEFAULT_MAX_ATTEMPTS`]).
+            /// Sets the largest number of candidates of a draw ([`DEFAULT_MAX_ATTEMPTS`]).
             pub fn max_attempts(mut self, max_attempts: u32) -> Self {
                 self.base.max_attempts = max_attempts;
                 self
@@ -247,12 +248,12 @@ impl Targets {
         self
     }
 
-    /// What must lie between 0 and 1 where there is a target LRV.
+    /// Sets the spectrum that must lie between 0 and 1 where there is a target LRV.
     pub fn bounds(self, bounds: Bounds) -> Self {
         Targets { bounds, ..self }
     }
 
-    /// What the targets of different levels have in common.
+    /// Sets the relation of the targets of different levels.
     pub fn copies(self, copies: Copies) -> Self {
         Targets { copies, ..self }
     }

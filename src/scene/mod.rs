@@ -63,10 +63,10 @@ pub use sampler::{PreparedScene, SceneSampler};
 pub use session::{GroupSummary, SceneSession, Window};
 pub use workload::{GroupWorkload, Workload};
 
-/// What data sets call arrays that are not a group's, in one format or another.
+/// Names of arrays that data sets have beside those of groups, in one format or another.
 const RESERVED: [&str; 7] = ["wavelength", "wavelengths", "attributes", "X", "S_X", "data", "comment"];
 
-/// What a data set of scenes has in each of them.
+/// A number of scenes, and the groups in each of them.
 pub struct Scene {
     scenes: u64,
     seed: u64,
@@ -84,12 +84,12 @@ pub struct SceneBuilder {
 }
 
 impl Scene {
-    /// Starts a data set of so many scenes, with nothing in them. [`SceneBuilder::build`] ends it.
+    /// Starts a data set of this number of scenes, without groups. [`SceneBuilder::build`] ends it.
     pub fn builder(scenes: u64) -> SceneBuilder {
         SceneBuilder { scenes, seed: 0, wavelengths: None, groups: Vec::new() }
     }
 
-    /// How many scenes there are.
+    /// Number of scenes.
     pub fn scenes(&self) -> u64 {
         self.scenes
     }

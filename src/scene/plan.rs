@@ -1,4 +1,4 @@
-//! What is drawn for a group, and where: a [`Group`] that was found to be possible.
+//! Plans to draw a [`Group`] that was found to be possible: the model, the recipe, and the engine or CPU.
 
 use serde::Serialize;
 
@@ -19,11 +19,11 @@ use super::target::{TargetPlan, key};
 pub(super) struct GroupPlan {
     pub(super) name: String,
     pub(super) kind: GroupKind,
-    /// What its spectra are drawn from; flat ones are not.
+    /// Model of its spectra; flat ones have none.
     pub(super) model: Option<Model>,
-    /// How many a scene has.
+    /// Number of elements per scene.
     pub(super) count: u32,
-    /// In rows of that.
+    /// Stream of the group, in rows of `count`.
     pub(super) stream: Stream,
     pub(super) max_attempts: u32,
     pub(super) shapes: Shapes,
@@ -33,7 +33,7 @@ pub(super) struct GroupPlan {
     pub(super) arrays: Vec<Array>,
 }
 
-/// What the spectra of a group are.
+/// Kind of a group's spectra.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum GroupKind {
@@ -41,11 +41,11 @@ pub enum GroupKind {
     Illuminant,
     /// Reflectances.
     Surface,
-    /// Reflectances that have something given.
+    /// Reflectances with a constraint.
     Target,
 }
 
-/// Where the spectra of a group come from, before intensities.
+/// Source of a group's spectra, before intensities.
 pub(super) enum Shapes {
     /// From the engine, for each scene.
     Engine(Box<Drawing>),
@@ -103,7 +103,7 @@ pub struct Array {
     pub per_scene: bool,
     /// The extents of an entry. Spectra have (count, bands), and other quantities one of them or none.
     pub shape: Vec<usize>,
-    /// What its values are between, if they are spectra.
+    /// Range of its values, if they are spectra.
     #[serde(skip)]
     pub range: Option<ValueRange>,
 }
@@ -118,7 +118,7 @@ fn array_name(group: &str, quantity: Quantity) -> String {
 }
 
 impl Array {
-    /// How many values an entry has.
+    /// Number of values of an entry.
     pub fn values(&self) -> usize {
         self.shape.iter().product()
     }
@@ -128,7 +128,7 @@ impl Array {
         if self.quantity == Quantity::Attempts { Dtype::U32 } else { Dtype::F32 }
     }
 
-    /// How many bytes an entry has: every value has 4.
+    /// Number of bytes of an entry: every value has 4.
     pub fn bytes(&self) -> usize {
         4 * self.values()
     }
@@ -203,7 +203,7 @@ impl GroupPlan {
         self.arrays.iter().any(|array| array.quantity == quantity)
     }
 
-    /// What the engine draws, where it does.
+    /// Spectra that the engine draws, if it draws any.
     pub(super) fn drawn_by_engine(&self) -> Option<&Drawing> {
         match &self.shapes {
             Shapes::Engine(drawing) => Some(drawing),

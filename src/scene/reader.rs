@@ -23,7 +23,7 @@ pub(super) struct Wrong {
 }
 
 impl Wrong {
-    /// The same, where it is a type, with all that is taken there.
+    /// Adds all accepted choices to a complaint about a type.
     pub(super) fn expecting(mut self, all: &'static str) -> Wrong {
         if let SceneErrorKind::Type { expected, .. } = &mut *self.problem {
             *expected = all;
@@ -36,7 +36,7 @@ impl Wrong {
 pub(super) struct Section<'a> {
     table: &'a DeTable<'a>,
     span: Range<usize>,
-    /// What complaints call it: `lrv` for a table under that key, nothing for one that is a group.
+    /// Name in complaints: `lrv` for a table under that key, empty for a group.
     path: String,
     group: Option<String>,
 }
@@ -76,7 +76,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// The same, as a part of a group.
+    /// Makes the section a part of a group.
     fn of(mut self, group: Option<String>) -> Section<'a> {
         self.group = group;
         self
@@ -104,7 +104,7 @@ impl<'a> Section<'a> {
         Wrong { span: self.span.clone(), group: self.group.clone(), key, problem: Box::new(problem) }
     }
 
-    /// Where each key is.
+    /// Places of the keys.
     pub(super) fn spans(&self) -> impl Iterator<Item = (&'a str, Range<usize>)> {
         self.table.keys().map(|key| (key.get_ref().as_ref(), key.span()))
     }
@@ -186,7 +186,7 @@ impl<'a> Entry<'a> {
         )
     }
 
-    /// So many numbers.
+    /// A list of N numbers.
     pub(super) fn numbers<const N: usize>(&self, expected: &'static str) -> Result<[f64; N], Wrong> {
         let found = || describe(self.value);
         let list =

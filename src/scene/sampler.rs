@@ -23,9 +23,9 @@ const COPIES: &str = include_str!("../../shaders/scene_copies.wgsl");
 /// a renderer.
 pub struct SceneSampler<'a> {
     scene: &'a Scene,
-    /// Those of the groups that the device draws.
+    /// Samplers of the groups that the device draws.
     samplers: Vec<Option<Sampler>>,
-    /// What multiplies and copies spectra, where some are.
+    /// Pipeline that multiplies and copies spectra, where some need it.
     copies: Option<wgpu::ComputePipeline>,
     once: Vec<Option<SharedSpectra>>,
 }
@@ -43,7 +43,7 @@ struct Group<'a> {
     copied: Option<Copied>,
     /// The spectra, where they are not those that are drawn.
     spectra: Option<wgpu::Buffer>,
-    /// What else is known of it: luminous reflectances, intensities.
+    /// Values beside the spectra: luminous reflectances, intensities.
     values: Vec<(&'a Array, Vec<f32>)>,
 }
 
@@ -53,7 +53,7 @@ struct Copied {
     values: u32,
 }
 
-/// What the shader of copies reads as `Sizes`.
+/// Uniform that the shader of copies declares as `Sizes`.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Sizes {
@@ -212,7 +212,7 @@ fn copies(plan: &GroupPlan) -> bool {
     plan.drawn_by_engine().is_some_and(|drawing| drawing.places < plan.count || plan.intensity.is_some())
 }
 
-/// The intensities of some scenes, and how many elements in a row have one: all, unless there are any.
+/// Intensities of some scenes, and the number of consecutive elements that share one: all, where there are none.
 fn intensities(plan: &GroupPlan, scenes: Range<u64>) -> (Vec<f32>, Option<u32>) {
     let Some(intensity) = &plan.intensity else { return (vec![1.0], None) };
     let lights = if intensity.scope == IntensityScope::Scene { plan.count } else { 1 };
@@ -220,7 +220,7 @@ fn intensities(plan: &GroupPlan, scenes: Range<u64>) -> (Vec<f32>, Option<u32>) 
     (elements.map(|(scene, element)| intensity.at(plan.stream, scene, element)).collect(), Some(lights))
 }
 
-/// The bytes of so many spectra, if a buffer of the device holds them.
+/// Size of a number of spectra in bytes, if a buffer of the device holds them.
 fn check(device: &Device, spectra: u64, bands: usize) -> Result<u64, EngineError> {
     let limits = device.limits();
     let row = 4 * bands as u64;

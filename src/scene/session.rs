@@ -16,13 +16,13 @@ use super::Scene;
 use super::group::IntensityScope;
 use super::plan::{Array, Drawing, GroupPlan, Shapes, is_multiplied};
 
-/// About how many bytes a window has where no engine draws it.
+/// Approximate size of a window in bytes, where no engine draws it.
 const WINDOW_BYTES: u64 = 8 << 20;
 
 /// Some scenes, with every array that differs between scenes.
 #[derive(Debug)]
 pub struct Window<'a> {
-    /// Which scenes these are.
+    /// Range of the scenes.
     pub scenes: Range<u64>,
     arrays: Vec<(&'a Array, Cow<'a, [u8]>)>,
 }
@@ -32,16 +32,16 @@ pub struct SceneSession<'a> {
     scene: &'a Scene,
     /// For the groups that the engine draws, where there are any.
     schedule: Option<Schedule<'a>>,
-    /// What was drawn once, of each group.
+    /// Spectra of each group that were drawn once.
     once: Vec<Option<SharedSpectra>>,
 }
 
-/// What a group took.
+/// Summary of a group's draws.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct GroupSummary {
     /// The group.
     pub group: String,
-    /// What its draws took.
+    /// Summary of its draws.
     #[serde(flatten)]
     pub summary: DrawSummary,
 }
@@ -94,7 +94,7 @@ impl Scene {
         Ok(SceneSession { scene: self, schedule, once: self.once()? })
     }
 
-    /// What serves all scenes, of each group.
+    /// Draws the spectra that serve all scenes, for each group.
     pub(super) fn once(&self) -> Result<Vec<Option<SharedSpectra>>, EngineError> {
         let once = |plan: &GroupPlan| match &plan.shapes {
             Shapes::Once(drawing) => SharedSpectra::new(plan, drawing).map(Some),
@@ -147,7 +147,7 @@ impl SceneSession<'_> {
         constants
     }
 
-    /// What the draws took that serve all scenes, of each group.
+    /// Summaries of the draws that serve all scenes, for each group.
     pub fn taken_once(&self) -> Vec<GroupSummary> {
         let summary = |(plan, once): (&GroupPlan, &Option<SharedSpectra>)| {
             let mut summary = DrawSummary::default();

@@ -15,7 +15,7 @@ use crate::recipe::{ProposalKind, Recipe, RecipeBuilder, RecipeError};
 use super::error::SceneErrorKind;
 use super::group::{Copies, Hue, LrvLevels, TargetConstraint, Targets};
 
-/// How targets are drawn.
+/// Method of drawing targets.
 pub(super) enum TargetPlan {
     /// At the luminous reflectance of each level.
     Levels { kernels: Vec<Kernel<f32>>, levels: Vec<f64> },
@@ -27,7 +27,7 @@ pub(super) enum TargetPlan {
     Uniform { program: Box<Program>, target: LrvTarget, low: f64, high: f64 },
     /// At tristimulus values.
     Xyz { kernel: Kernel<f32>, y: f64 },
-    /// At those of a hue.
+    /// At the tristimulus values of a hue.
     Hue { program: Box<Program>, condition: Condition, spectrum: Affine, hue: Hue },
     /// Nothing is drawn.
     Flat { levels: LrvLevels, bands: usize },
@@ -40,12 +40,13 @@ pub(super) struct DrawnTarget {
     pub(super) lrv: f32,
     /// The tristimulus values that were given.
     pub(super) xyz: Option<[f32; 3]>,
-    /// What it took; none where nothing was drawn.
+    /// Status of the draw; `None` where nothing was drawn.
     pub(super) status: Option<DrawStatus>,
 }
 
 impl TargetPlan {
-    /// How to draw these targets on a grid of so many bands, of a stream in rows; or the key that is wrong, and why.
+    /// Plans the drawing of targets on a grid of `bands` bands, from a stream in rows; an error has the key that is
+    /// wrong.
     pub(super) fn new(
         targets: &Targets,
         bands: usize,
@@ -132,7 +133,7 @@ impl TargetPlan {
         }
     }
 
-    /// Target `element` of `scene`. The stream is in rows of so many as a scene has.
+    /// Target `element` of `scene`. The stream is in rows of as many as a scene has.
     pub(super) fn draw(&self, stream: Stream, scene: u64, element: u32) -> DrawnTarget {
         let row = u64::from(stream.row());
         let at = |scene: u64| scene * row + u64::from(element);
@@ -176,7 +177,7 @@ impl TargetPlan {
 }
 
 impl DrawnTarget {
-    /// The same at another luminous reflectance.
+    /// Rescales the target to another luminous reflectance.
     fn scaled(mut self, from: f64, to: f64) -> DrawnTarget {
         let by = (to / from) as f32;
         self.spectrum.iter_mut().for_each(|value| *value *= by);
@@ -218,7 +219,7 @@ fn corners(hue: &Hue) -> [(f64, f64); 4] {
     [(a, c), (a, d), (b, c), (b, d)]
 }
 
-/// What a recipe of targets cannot know.
+/// Checks the targets for errors that their recipe cannot find.
 fn check(targets: &Targets) -> Result<(), (&'static str, SceneErrorKind)> {
     let level = |value: f64| match value > 0.0 && value < 1.0 {
         true => Ok(()),

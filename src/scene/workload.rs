@@ -1,4 +1,4 @@
-//! What drawing a scene takes, and what it is spared.
+//! Workload of drawing a scene, and the work that is spared.
 
 use serde::Serialize;
 
@@ -7,40 +7,40 @@ use super::plan::{Array, GroupKind, GroupPlan, Shapes};
 use super::target::TargetPlan;
 use crate::quantity::Quantity;
 
-/// What drawing a scene takes.
+/// Workload of drawing a scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct Workload {
     /// The groups, in order.
     pub groups: Vec<GroupWorkload>,
-    /// How many shaders are compiled, where a graphics adapter draws.
+    /// Number of shaders compiled, where a graphics adapter draws.
     pub shaders: usize,
-    /// How many spectra are drawn for so many scenes, those of all scenes included.
+    /// Number of spectra drawn for all scenes.
     pub draws: u64,
-    /// What is not done, and why.
+    /// Work that is spared, and why.
     pub left_out: Vec<String>,
-    /// How many bytes all arrays have.
+    /// Size of all arrays in bytes.
     pub bytes: u64,
 }
 
-/// What drawing a group takes.
+/// Workload of drawing a group.
 #[derive(Clone, Debug, Serialize)]
 pub struct GroupWorkload {
     /// Its name.
     pub name: String,
-    /// What its spectra are.
+    /// Kind of its spectra.
     pub kind: GroupKind,
     /// The number of the shader that draws it, from 1; none where the CPU does.
     pub shader: Option<usize>,
-    /// How many spectra are drawn for each scene.
+    /// Number of spectra drawn for each scene.
     pub draws_per_scene: u64,
-    /// How many are drawn once for all.
+    /// Number of spectra drawn once for all scenes.
     pub draws_once: u64,
     /// Its arrays.
     pub arrays: Vec<Array>,
 }
 
 impl Scene {
-    /// What drawing so many scenes takes.
+    /// Computes the workload of drawing a number of scenes.
     pub fn workload(&self, scenes: u64) -> Workload {
         let mut programs: Vec<&crate::program::Program> = Vec::new();
         let mut left_out = Vec::new();
@@ -102,7 +102,7 @@ impl Scene {
     }
 }
 
-/// How many spectra are drawn for each scene, and how many once.
+/// Number of spectra drawn for each scene, and number drawn once.
 fn draws(plan: &GroupPlan) -> (u64, u64) {
     match &plan.shapes {
         Shapes::Engine(drawing) => (drawing.places.into(), 0),
@@ -115,7 +115,7 @@ fn draws(plan: &GroupPlan) -> (u64, u64) {
     }
 }
 
-/// What a group spares.
+/// Describes the work that a group spares.
 fn spared(plan: &GroupPlan) -> Option<String> {
     let name = &plan.name;
     Some(match &plan.shapes {

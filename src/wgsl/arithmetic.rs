@@ -1,10 +1,10 @@
-//! What is computed of a candidate, in straight lines or in loops.
+//! Arithmetic of a candidate, in straight lines or in loops.
 //!
 //! Either way the functions are the same, of a candidate's `Normals`, and so is the order of operations:
 //! - `normals(key, index, stream, attempt) -> Normals`: k standard normals; or, of a cover,
 //!   `candidate(key, index, stream, attempt) -> Candidate`;
 //! - `worst(z) -> u32`: the largest `excess` of a band before scaling;
-//! - `factor(z) -> f32`: what scales it to the target, where there is one;
+//! - `factor(z) -> f32`: the factor that scales it to the target, where there is one;
 //! - `is_accepted(z) -> bool`;
 //! - `scale(z, key, index, stream) -> f32`: what multiplies a draw's spectrum, where something does.
 //!
@@ -21,7 +21,7 @@ use crate::program::{IntensityLaw, LrvLaw, LrvTarget, Program, Source, Unit};
 use crate::random::real::Arithmetic;
 use crate::random::stream;
 
-/// All of it.
+/// Writes all of the arithmetic.
 pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
     let mut text = match Form::of(program) {
         Form::Unrolled => unrolled(program),

@@ -62,7 +62,7 @@ const WORDS: &str = include_str!("../../shaders/words.wgsl");
 const HALF: &str = include_str!("../../shaders/half.wgsl");
 const MAIN: &str = include_str!("../../shaders/main.wgsl");
 
-/// What a device can do, as far as the text depends on it.
+/// Capabilities of a device on which the text depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Dialect {
     /// Any device.
@@ -73,7 +73,7 @@ pub(crate) enum Dialect {
     SoftwareInt64,
 }
 
-/// How a program's arithmetic is written.
+/// Form in which a program's arithmetic is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {
     /// In straight lines, with the model's numbers as constants.
@@ -91,7 +91,7 @@ impl Form {
     }
 }
 
-/// How many draws one thread makes: 2 where they fill words that are wider than a value.
+/// Number of draws that one thread makes: 2 where they fill words that are wider than a value.
 pub(crate) fn draws_per_thread(program: &Program, target: Dialect) -> u32 {
     let halves = program.outputs.iter().any(|output| output.format.dtype == Dtype::F16);
     match (Form::of(program), target) {

@@ -8,7 +8,7 @@ use crate::program::{IntensityLaw, Program, Source, Unit};
 use crate::quantity::Quantity;
 use crate::random::real::Arithmetic;
 
-/// Why a recipe has no text.
+/// Error returned where a recipe has no WGSL module.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
@@ -47,7 +47,7 @@ pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, WgslErro
     Ok(prefixed(&format!("{draw}\n{}", interface(program)), prefix))
 }
 
-/// What a host calls.
+/// Writes the functions that a host calls.
 fn interface(program: &Program) -> String {
     let attempts = program.max_attempts;
     let mut text = Text::default();

@@ -15,12 +15,13 @@ use crate::random::truncated::truncated;
 use crate::recipe::Recipe;
 use crate::wgsl::{Dialect, generator};
 
-/// What `body` writes to `output` for each `i`, on the best adapter.
+/// Runs `body` for each `i` on the best adapter, and returns `output`.
 fn run(target: Dialect, body: &str, input: &[u32], output_words: usize) -> Option<Vec<u32>> {
     run_with(target, "", &[], body, input, output_words)
 }
 
-/// The same with fragments of its own, and a buffer for them at binding 2 unless it would be empty.
+/// Runs `body` as [`run`] does, with fragments of its own, and a buffer for them at binding 2 unless it would be
+/// empty.
 fn run_with(
     target: Dialect,
     fragments: &str,

@@ -1,4 +1,4 @@
-//! What is stored of the draws of a thread: `fn store`, and the buffers that it writes.
+//! Stores of a thread's draws: `fn store`, and the buffers that it writes.
 
 use super::tables::Tables;
 use super::text::Text;
@@ -8,7 +8,7 @@ use crate::program::{Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, ValueRange};
 use crate::random::real::Arithmetic;
 
-/// How the values of an output make words of its buffer.
+/// Packing of an output's values into words of its buffer.
 #[derive(Clone, Copy, PartialEq)]
 enum Word {
     /// A value is a word.
@@ -52,12 +52,12 @@ impl Word {
     }
 }
 
-/// Which value of a row.
+/// Place of a value in a row.
 #[derive(Clone, Copy)]
 enum At<'a> {
-    /// This one, in straight lines.
+    /// The value of this number, in straight lines.
     Number(usize),
-    /// That of a variable, in a loop.
+    /// The value that a variable numbers, in a loop.
     Variable(&'a str),
 }
 
@@ -249,7 +249,7 @@ fn within(value: String, interval: ValueRange) -> String {
     }
 }
 
-/// Where a plane starts, in words.
+/// Offset of a plane, in words.
 fn plane(word: Word, at: At) -> String {
     let number = match at {
         At::Number(j) => format!("{j}u"),

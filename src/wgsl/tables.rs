@@ -12,9 +12,9 @@ pub(crate) struct Tables {
     pub(super) maps: Vec<usize>,
     /// The row that each output's unit is over.
     pub(super) units: Vec<usize>,
-    /// Where the bands' LRV weights start.
+    /// Offset of the bands' LRV weights.
     pub(super) lrv_weights: usize,
-    /// Where the levels start.
+    /// Offset of the levels.
     pub(super) levels: usize,
 }
 

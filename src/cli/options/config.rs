@@ -50,7 +50,7 @@ pub(in crate::cli) fn expand(command: &Command, given: Vec<OsString>) -> Result<
     Ok(all)
 }
 
-/// What an argument is called in the file.
+/// Name of an argument in the file.
 fn name_of(argument: &Arg) -> String {
     argument.get_long().unwrap_or(argument.get_id().as_str()).to_owned()
 }

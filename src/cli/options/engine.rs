@@ -1,4 +1,4 @@
-//! Where to draw.
+//! Options of where to draw.
 
 use std::num::NonZeroUsize;
 
@@ -21,19 +21,19 @@ pub(in crate::cli) enum EngineName {
 /// The choice of what draws, for the commands that do.
 #[derive(clap::Args)]
 pub(in crate::cli) struct EngineArguments {
-    /// Where to draw [default: auto]
+    /// Draw on this engine [default: auto]
     #[arg(long, value_enum, conflicts_with = "adapter")]
     engine: Option<EngineName>,
     /// Draw on the adapter of this index or name (see `spectroll adapters`)
     #[arg(long, value_name = "NAME|INDEX")]
     adapter: Option<String>,
-    /// How many threads the CPU draws with [default: one a core]
+    /// Draw with this number of threads on the CPU [default: one per core]
     #[arg(short, long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
     pub(in crate::cli) threads: Option<NonZeroUsize>,
 }
 
 impl EngineArguments {
-    /// What was asked for; nothing where it was not.
+    /// Engine that was asked for; `None` where none was.
     pub(in crate::cli) fn choice(&self) -> Option<EngineChoice> {
         let named = self.engine.map(|engine| match engine {
             EngineName::Auto => EngineChoice::Auto,

@@ -1,4 +1,4 @@
-//! Where a data set goes: what `--output` and the options beside it say together.
+//! Options of where a data set goes: `--output` and the options beside it.
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ pub(in crate::cli) struct OutputArguments {
     /// The type of the numbers
     #[arg(long, value_enum, default_value = "f32")]
     dtype: Dtype,
-    /// How many draws each chunk of a .zarr or of FOLDER/ has [default: what makes about 16 MiB]
+    /// Number of draws per chunk of a .zarr or of FOLDER/ [default: about 16 MiB]
     #[arg(long, value_name = "DRAWS", value_parser = count)]
     chunk: Option<u64>,
     /// Pack the chunks of a .zarr with Zstandard [level: 3]
@@ -54,12 +54,12 @@ impl OutputArguments {
         !self.output.as_os_str().is_empty()
     }
 
-    /// What to do with a file that exists.
+    /// Treatment of a file that exists.
     pub(in crate::cli) fn if_exists(&self) -> IfExists {
         if_exists(self.force)
     }
 
-    /// What the name and the options mean together.
+    /// Combines the name and the options.
     pub(in crate::cli) fn resolve(&self) -> anyhow::Result<Output> {
         let destination = self.destination()?;
         let mut output = Output::at(&self.output, destination).dtype(self.dtype).mode(match self.resume {

@@ -1,4 +1,4 @@
-//! What is asked of a draw.
+//! Options of a recipe.
 
 use clap::ValueEnum;
 use spectroll::{
@@ -24,7 +24,7 @@ pub(in crate::cli) struct RecipeArguments {
     /// mean powers)
     #[arg(long, value_name = "I", value_parser = intensity)]
     intensity: Option<Intensity>,
-    /// What to write for each draw (comma-separated)
+    /// Quantities to write for each draw (comma-separated)
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", default_value = "spectra")]
     quantities: Vec<Quantity>,
     /// The illuminant of reflectances' XYZ and linear sRGB

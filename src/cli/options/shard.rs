@@ -1,4 +1,4 @@
-//! `--shard`: which part of a data set one of several processes makes.
+//! `--shard`: the part of a data set that one of several processes makes.
 
 use std::env;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use spectroll::output::Shard;
 
 use crate::cli::exit::Usage;
 
-/// What was asked for.
+/// Shard that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::cli) enum ShardName {
     /// `I/N`.

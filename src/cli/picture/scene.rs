@@ -66,7 +66,7 @@ struct Tile {
     targets: Vec<String>,
     /// The least and the largest of its targets'.
     lrv: Option<[f32; 2]>,
-    /// The same of its lights'.
+    /// Smallest and largest intensity of its lights.
     intensity: Option<[f32; 2]>,
 }
 
@@ -321,7 +321,7 @@ struct Values<'a> {
 }
 
 impl Values<'_> {
-    /// Those of an array of f32, be it of this scene or of all; none where there is no such array.
+    /// Values of an array of f32, of this scene or of all; empty where there is no such array.
     fn of(&self, name: &str) -> &[f32] {
         if let Some((_, values)) = self.constants.iter().find(|(constant, _)| constant == name) {
             return values;

@@ -1,4 +1,4 @@
-//! `spectroll sample --dry-run`: what would be made, and whether it can be.
+//! `spectroll sample --dry-run`: a forecast of what would be made, and whether it can be.
 
 use std::io::Write;
 use std::path::Path;
@@ -12,19 +12,19 @@ use spectroll::{Engine, Recipe, Stream};
 use crate::cli::folder;
 use crate::cli::parse::{grouped, size};
 
-/// How long the drawing is tried.
+/// Duration of the trial of drawing.
 const TRIAL: Duration = Duration::from_millis(300);
 
 /// Bytes of a number as text, with what sets it apart: ours have 8 digits or so.
 const TEXT: u64 = 11;
 
-/// What would be made.
+/// Forecast of a run.
 #[derive(Serialize)]
 pub(in crate::cli) struct DryRun {
     output: String,
     draws: u64,
     arrays: Vec<Array>,
-    /// About how many, where they are text.
+    /// Size in bytes; approximate for text.
     bytes: u64,
     /// How many files there would be of text, in a folder.
     files: Option<u64>,
@@ -150,7 +150,7 @@ pub(in crate::cli) fn free(path: &Path) -> Option<u64> {
     fs4::available_space(folder(path)).ok()
 }
 
-/// Whether the disk has room, with so much of it free.
+/// Describes whether the disk has room, with `free` bytes of it free.
 pub(in crate::cli) fn room(path: &Path, bytes: u64, free: Option<u64>) -> String {
     let folder = folder(path);
     match free {

@@ -1,4 +1,4 @@
-//! How far a long run is: a bar on a terminal, a line every ten seconds elsewhere.
+//! Progress of a long run: a bar on a terminal, a line every ten seconds elsewhere.
 
 use std::cell::Cell;
 use std::fmt;
@@ -9,10 +9,10 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 
 use crate::cli::parse::grouped;
 
-/// How often a line is printed where there is no terminal.
+/// Time between lines where there is no terminal.
 const LINES: Duration = Duration::from_secs(10);
 
-/// Where progress is shown.
+/// Display of progress.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Shown {
     /// As a bar, but not before a second has passed.
@@ -23,7 +23,7 @@ pub(super) enum Shown {
 }
 
 impl Shown {
-    /// How progress is shown of a run that is quiet or not, and whose data go to standard output or not.
+    /// Chooses the display of progress for a run that is quiet or not, and whose data go to standard output or not.
     pub(super) fn to(quiet: bool, to_stdout: bool) -> Shown {
         match (io::stderr().is_terminal(), to_stdout && io::stdout().is_terminal()) {
             _ if quiet => Shown::Never,

@@ -1,5 +1,5 @@
-//! Numerical error against cost: draws of each engine, and of variants that could be had instead, beside the draws in
-//! f64 of the same words.
+//! Numerical error against cost: draws of each engine, and of alternative implementations, compared with draws in f64
+//! of the same words.
 
 use std::ops::{Add, Div, Mul};
 
@@ -24,49 +24,49 @@ use crate::recipe::Recipe;
 /// Numerical error against cost.
 #[derive(Clone, Debug, Serialize)]
 pub struct Accuracy {
-    /// How many draws were compared.
+    /// Number of draws that were compared.
     pub draws: u64,
     /// Engines, and variants of them.
     pub variants: Vec<Variant>,
-    /// The functions of Box-Muller, ours and built-in.
+    /// Functions of Box-Muller, ours and built-in.
     pub functions: Vec<Functions>,
 }
 
-/// Draws made in one way, beside those in f64.
+/// Variant of drawing, compared with f64.
 #[derive(Clone, Debug, Serialize)]
 pub struct Variant {
-    /// What is different.
+    /// Name of the variant: its difference.
     pub name: String,
-    /// Nanoseconds a draw, where the variant is an engine.
+    /// Nanoseconds per draw, where the variant is an engine.
     pub nanoseconds: Option<f64>,
-    /// Bytes of a value.
+    /// Bytes per value.
     pub bytes: u32,
     /// Draws that took another candidate, per million.
     pub flips_per_million: f64,
-    /// The largest error of a band's value in each draw, in units of reflectance or relative power.
+    /// Largest error of a band's value in each draw, in units of reflectance or relative power.
     pub spectra: Errors,
-    /// The same in units in the last place of the f32 value.
+    /// Largest error of a band's value in each draw, in units in the last place of the f32 value.
     pub ulps: Errors,
-    /// The largest error of a weight in each draw.
+    /// Largest error of a weight in each draw.
     pub weights: Errors,
     /// The error of the luminous reflectance, or for lights of the relative luminance, in each draw.
     pub luminance: Errors,
-    /// The largest error of X, Y and Z in each draw, where a perfect white, or the mean light, has Y = 1.
+    /// Largest error of X, Y and Z in each draw, where a perfect white, or the mean light, has Y = 1.
     pub xyz: Errors,
-    /// The mean over draws of the error of a band, root mean square over bands: what no number of draws averages away.
+    /// Mean over draws of the error of a band, root mean square over bands: no number of draws averages it away.
     pub bias: f64,
-    /// The standard error of the bias: a bias below twice that is not told from none.
+    /// Standard error of the bias: a bias below twice that is not told from none.
     pub bias_error: f64,
 }
 
 /// Errors over all draws.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Errors {
-    /// The largest.
+    /// Largest error.
     pub max: f64,
-    /// What one draw in a thousand exceeds.
+    /// Error that one draw in a thousand exceeds.
     pub p999: f64,
-    /// The root of the mean square.
+    /// Root mean square error.
     pub rms: f64,
 }
 
@@ -106,16 +106,16 @@ pub(super) fn measure(
     Ok(Accuracy { draws: draws.count, variants, functions })
 }
 
-/// The draws in f64 that others are held against.
+/// Draws in f64 that others are compared with.
 struct Judge<'a> {
     recipe: &'a Recipe,
     draws: DrawRange,
     exact: Vec<(Vec<f64>, DrawStatus)>,
-    /// The weights of X, Y and Z.
+    /// Weights of X, Y and Z.
     xyz: [Vec<f64>; 3],
 }
 
-/// The spectra of draws on the CPU, and what each took.
+/// Spectra and statuses of draws on the CPU.
 fn scalar_draws<R: Real>(recipe: &Recipe, draws: DrawRange) -> Vec<(Vec<R>, DrawStatus)> {
     let session = recipe.scalar_sampler::<R>();
     let draw = |i| {
@@ -125,7 +125,7 @@ fn scalar_draws<R: Real>(recipe: &Recipe, draws: DrawRange) -> Vec<(Vec<R>, Draw
     (0..draws.count).into_par_iter().map(draw).collect()
 }
 
-/// The errors of a draw.
+/// Errors of a draw.
 struct Difference {
     spectrum: f64,
     ulps: f64,
@@ -139,7 +139,7 @@ impl<'a> Judge<'a> {
         Judge { recipe, draws, exact: scalar_draws(recipe, draws), xyz: xyz_weights(recipe.model()) }
     }
 
-    /// The same draws in another arithmetic on the CPU.
+    /// Makes the judged draws in another arithmetic on the CPU.
     fn scalar<R: Real + Into<f32>>(&self) -> (Vec<f32>, Vec<DrawStatus>) {
         let (spectra, statuses): (Vec<_>, Vec<_>) =
             scalar_draws::<R>(self.recipe, self.draws).into_iter().unzip();
@@ -187,7 +187,7 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// The root mean square over bands of the mean error, and its standard error.
+/// Root mean square over bands of the mean error, and its standard error.
 fn bias(pairs: &[(&[f32], &[f64])], bands: usize) -> (f64, f64) {
     let n = pairs.len() as f64;
     let (mut square, mut variance) = (0.0, 0.0);
@@ -213,8 +213,8 @@ impl Errors {
     }
 }
 
-/// The weights of X, Y and Z: of reflectances under D65, where a perfect white has Y = 1, and of lights where the
-/// model's mean has. All zero where there is no light that the eye sees.
+/// Weights of X, Y and Z: of reflectances under D65, where a perfect white has Y = 1, and of lights where the model's
+/// mean has. All zero where there is no visible light.
 fn xyz_weights(model: &Model) -> [Vec<f64>; 3] {
     let grid = model.grid();
     let none = || [(); 3].map(|()| vec![0.0; grid.len()]);
@@ -228,7 +228,7 @@ fn xyz_weights(model: &Model) -> [Vec<f64>; 3] {
     }
 }
 
-/// An f32 whose normals are made in another way.
+/// Defines an f32 whose normals are made in another way.
 macro_rules! altered {
     ($(#[$doc:meta])* $name:ident, $normals:expr) => {
         $(#[$doc])*
@@ -299,13 +299,13 @@ macro_rules! altered {
 }
 
 altered!(
-    /// Uniforms of 24 bits, as generators of f32 usually have them.
+    /// f32 with uniforms of 24 bits, as generators of f32 usually have them.
     Coarse,
     |x, y| f32::normal_pair(x & !0xFF | 0x80, y & !0xFF | 0x80)
 );
 
 altered!(
-    /// Box-Muller as textbooks have it, with the logarithm, sine and cosine of the system's library.
+    /// f32 with Box-Muller as textbooks have it, with the logarithm, sine and cosine of the system's library.
     Platform,
     |x, y| {
         let radius = (-2.0 * f32::uniform(x).ln()).max(0.0).sqrt();

@@ -12,16 +12,16 @@ use super::{Bench, ReportError};
 use crate::random::stream::{DrawRange, Stream};
 use crate::recipe::Recipe;
 
-/// The parts of the reference, whose differences tell its own error.
+/// Number of parts of the reference, whose differences give its own error.
 const PARTS: u64 = 100;
 
-/// The least and the most replicates of a number of draws.
+/// Least and largest number of replicates for a number of draws.
 const REPLICATES: [u64; 2] = [10, 40];
 
 /// Statistical error against run time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Convergence {
-    /// What all are held against.
+    /// Reference of all comparisons.
     pub reference: Reference,
     /// An entry for each engine and number of draws.
     pub points: Vec<Point>,
@@ -32,14 +32,14 @@ pub struct Convergence {
 /// The reference, in f64.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reference {
-    /// How many draws it has.
+    /// Number of draws.
     pub draws: u64,
-    /// Its own error: of the mean spectrum (reflectance or relative power), the covariance (in parts of itself) and the
-    /// acceptance. Times sqrt(draws / n) this is what n draws must err by.
+    /// Error of the reference itself: of the mean spectrum (reflectance or relative power), the covariance (relative
+    /// to itself) and the acceptance. Times sqrt(draws / n) this is the expected error of n draws.
     pub errors: [f64; 3],
-    /// The share of candidates that it accepted.
+    /// Share of candidates that it accepted.
     pub acceptance: f64,
-    /// The root of the mean variance of a band.
+    /// Root of the mean variance of a band.
     pub deviation: f64,
 }
 
@@ -48,28 +48,29 @@ pub struct Reference {
 pub struct Point {
     /// The engine, as an index into the report's.
     pub engine: usize,
-    /// How many draws, n.
+    /// Number of draws, n.
     pub draws: u64,
-    /// How many times.
+    /// Number of replicates.
     pub replicates: u64,
-    /// Run time, seconds: the median, the least and the most.
+    /// Run time, seconds: median, smallest and largest.
     pub seconds: [f64; 3],
-    /// Root mean square errors, as of [`Reference::errors`].
+    /// Root mean square errors, in the order of [`Reference::errors`].
     pub errors: [Confidence; 3],
 }
 
-/// What an engine comes to.
+/// Figures of merit of an engine.
 #[derive(Clone, Debug, Serialize)]
 pub struct Merit {
     /// The engine, as an index into the report's.
     pub engine: usize,
-    /// The time from the engine's open device to the first draw, seconds: a compiled shader, buffers.
+    /// Time from the engine's open device to the first draw, seconds: a compiled shader, buffers.
     pub first_draw: f64,
-    /// Nanoseconds a draw at the most draws.
+    /// Nanoseconds per draw at the largest number of draws.
     pub nanoseconds: f64,
-    /// The slope of log error of the mean over log draws: -1/2 where nothing but chance is at work.
+    /// Slope of log error of the mean over log draws: -1/2 where nothing but chance is at work.
     pub slope: Confidence,
-    /// Squared error of the mean times seconds at the most draws: less is better, whatever the number of draws.
+    /// Squared error of the mean times seconds at the largest number of draws: less is better, whatever the number of
+    /// draws.
     pub error2_seconds: Confidence,
 }
 
@@ -99,7 +100,7 @@ pub(super) fn measure(bench: &Bench, name: &str, recipe: &Recipe) -> Result<Conv
     Ok(Convergence { reference, points, merits })
 }
 
-/// The reference, in f64 from a stream of its own.
+/// Makes the reference, in f64 from a stream of its own.
 fn reference(
     bench: &Bench,
     name: &str,
@@ -169,7 +170,7 @@ impl<'a> Runs<'a> {
         Ok(Runs { bench, recipe, reference, runner, first_draw })
     }
 
-    /// `count` replicates of so many draws.
+    /// Runs `count` replicates of `draws` draws.
     fn replicates(&mut self, draws: u64, count: u64) -> Result<Replicates, ReportError> {
         let stream = Stream::named(self.bench.seed, &format!("{draws} draws"));
         self.runner.time(self.bench, stream.draws(0..draws))?; // buffers and windows find their size
@@ -184,14 +185,14 @@ impl<'a> Runs<'a> {
     }
 }
 
-/// The times and the errors of replicates of a number of draws.
+/// Times and errors of replicates of a number of draws.
 struct Replicates {
     draws: u64,
     seconds: Vec<f64>,
     errors: Vec<[f64; 3]>,
 }
 
-/// The median, the least and the most.
+/// Median, smallest and largest.
 fn spread(values: &[f64]) -> [f64; 3] {
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
     [median(values), least, values.iter().copied().fold(0.0, f64::max)]
@@ -230,7 +231,7 @@ fn merit(engine: usize, first_draw: f64, all: &[Replicates]) -> Merit {
     }
 }
 
-/// Of the line of least squares.
+/// Slope of the line of least squares.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (mx, my) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));

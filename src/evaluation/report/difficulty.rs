@@ -1,4 +1,4 @@
-//! Cost against difficulty: what a draw costs where few candidates are accepted.
+//! Cost against difficulty: time per draw where few candidates are accepted.
 
 use std::fmt;
 
@@ -56,20 +56,20 @@ pub struct Task {
     pub setting: Difficult,
     /// The engine, as an index into the report's.
     pub engine: usize,
-    /// How many draws each run made.
+    /// Number of draws of each run.
     pub draws: u64,
     /// Whether candidates came from a cover.
     pub covered: bool,
-    /// The probability that a spectrum of the model obeys the rule.
+    /// Probability that a spectrum of the model is accepted.
     pub probability: f64,
-    /// The share of candidates that were accepted.
+    /// Share of candidates that were accepted.
     pub acceptance: f64,
-    /// Nanoseconds an accepted draw, the median of 3 runs.
+    /// Nanoseconds per accepted draw, the median of 3 runs.
     pub nanoseconds: f64,
 }
 
 impl Task {
-    /// Candidates for each draw.
+    /// Candidates per draw.
     pub fn attempts(&self) -> f64 {
         1.0 / self.acceptance
     }

@@ -1,4 +1,4 @@
-//! What draws, in one form: engines in f32, and the CPU in f64.
+//! Subjects of measurement in one form: engines in f32, and the CPU in f64.
 
 use std::time::Instant;
 
@@ -13,26 +13,26 @@ use crate::evaluation::statistics::rows;
 use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
 
-/// Draws of a window in f64.
+/// Number of draws of a window in f64.
 const WINDOW: u64 = 1 << 15;
 
-/// What drew.
+/// Facts about an engine.
 #[derive(Clone, Debug, Serialize)]
 pub struct EngineFacts {
-    /// What it is called, briefly.
+    /// Short name.
     pub name: String,
-    /// The floating-point type of its draws.
+    /// Floating-point type of its draws.
     pub precision: &'static str,
-    /// What it is called in full, with the driver.
+    /// Full name, with the driver.
     pub description: String,
-    /// The adapter; nothing on the CPU.
+    /// Adapter; `None` on the CPU.
     pub adapter: Option<Adapter>,
 }
 
-/// What draws.
+/// Subject of a measurement.
 pub(super) struct Subject {
     pub(super) facts: EngineFacts,
-    /// Nothing for f64.
+    /// Engine; `None` for f64.
     engine: Option<Engine>,
 }
 
@@ -81,14 +81,14 @@ impl Subject {
     }
 }
 
-/// A target with a recipe.
+/// A subject with a recipe.
 pub(super) enum Runner<'a> {
     Single(Session<'a>),
     Double(Kernel<f64>),
 }
 
 impl Runner<'_> {
-    /// Makes `draws` and hands them to `sink` in order. Returns how many candidates that took.
+    /// Draws a range and hands it to `sink` in order. Returns the number of candidates that took.
     pub(super) fn draw(
         &mut self,
         bench: &Bench,
@@ -119,7 +119,7 @@ impl Runner<'_> {
         }
     }
 
-    /// How long `draws` take, when nothing is done with them; and how many candidates they took.
+    /// Measures the time to draw a range without further work, and the number of candidates.
     pub(super) fn time(&mut self, bench: &Bench, draws: DrawRange) -> Result<(f64, u64), ReportError> {
         let start = Instant::now();
         let attempts = self.draw(bench, draws, &mut |_, _| {})?;
@@ -127,7 +127,7 @@ impl Runner<'_> {
     }
 }
 
-/// The spectra of a batch, and what each draw took.
+/// Spectra and statuses of a batch.
 fn contents<'b>(batch: &'b Batch) -> (&'b [f32], &'b [DrawStatus]) {
     debug_assert_eq!(rows(batch).count() as u64, batch.draws.count);
     (batch.spectra(), batch.statuses())

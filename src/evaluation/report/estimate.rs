@@ -1,4 +1,4 @@
-//! Estimates from many draws, how far they are from others, and how sure that is.
+//! Estimates from many draws, their distances, and confidence intervals.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -8,7 +8,7 @@ use super::engines::Values;
 use crate::model::Model;
 use crate::random::philox::philox;
 
-/// Resamplings of a confidence interval.
+/// Number of resamplings for a confidence interval.
 const RESAMPLINGS: u32 = 1000;
 
 /// A value and its 95 % confidence interval.
@@ -35,11 +35,11 @@ pub(super) struct Moments<'a> {
     products: Vec<f64>,
 }
 
-/// What draws tell of their distribution.
+/// Estimates of the distribution of draws.
 #[derive(Clone, Debug)]
 pub(super) struct Estimate {
     pub(super) mean: DVector<f64>,
-    /// Of the weights, k x k.
+    /// Covariance of the weights, k x k.
     pub(super) covariance: DMatrix<f64>,
     pub(super) acceptance: f64,
 }
@@ -118,7 +118,7 @@ impl<'a> Moments<'a> {
         }
     }
 
-    /// The root of the mean variance of a band.
+    /// Root of the mean variance of a band.
     pub(super) fn deviation(&self) -> f64 {
         let n = self.draws as f64;
         let variances = self.bands.iter().zip(&self.squares).map(|(s, q)| q / n - (s / n).powi(2));
@@ -127,8 +127,8 @@ impl<'a> Moments<'a> {
 }
 
 impl Estimate {
-    /// How far this is from another: of the mean spectrum the root mean square over bands, of the covariance the
-    /// Frobenius norm in parts of the other's, and of the acceptance the difference.
+    /// Distances from another estimate: of the mean spectrum the root mean square over bands, of the covariance the
+    /// Frobenius norm relative to the other's, and of the acceptance the difference.
     pub(super) fn errors(&self, other: &Estimate) -> [f64; 3] {
         [
             (&self.mean - &other.mean).norm() / (self.mean.len() as f64).sqrt(),
@@ -146,15 +146,16 @@ pub(super) fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// The value that a share of all are at most.
+/// Smallest value that a share of all do not exceed.
 pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     sorted[((sorted.len() as f64 * share) as usize).min(sorted.len() - 1)]
 }
 
-/// A statistic of replicates with its 95 % confidence interval: percentiles over resamplings of the replicates (the
-/// bootstrap). `statistic` is given, for each of several lists, which of its `lengths` replicates to take.
+/// Computes a statistic of replicates with its 95 % confidence interval: percentiles over resamplings of the
+/// replicates (the bootstrap). `statistic` receives, for each of several lists, which of its `lengths` replicates to
+/// take.
 pub(super) fn bootstrap(lengths: &[usize], statistic: impl Fn(&[Vec<usize>]) -> f64) -> Confidence {
     let plain: Vec<Vec<usize>> = lengths.iter().map(|&n| (0..n).collect()).collect();
     let resampled: Vec<f64> = (0..RESAMPLINGS)

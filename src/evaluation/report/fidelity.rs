@@ -1,5 +1,5 @@
-//! Fidelity to the method: what the components explain, what rejection does to the covariance, and how often scaling
-//! to a luminous reflectance leaves the physical.
+//! Fidelity to the method: the variance that components explain, the effect of rejection on the covariance, and the
+//! share of draws that scaling to a luminous reflectance takes out of the physical range.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -16,52 +16,52 @@ use crate::recipe::Recipe;
 /// Fidelity to the method.
 #[derive(Clone, Debug, Serialize)]
 pub struct Fidelity {
-    /// The share of the data's variance that each component explains.
+    /// Share of the data's variance that each component explains.
     pub explained: Vec<f64>,
-    /// How the weights of the data, of the Gaussian and of accepted draws spread.
+    /// Spreads of the weights: of the data, of the Gaussian and of accepted draws.
     pub spreads: Vec<Spread>,
-    /// What rejection does to the covariance.
+    /// Effect of rejection on the covariance.
     pub shrinkage: Vec<Shrinkage>,
-    /// How often the rule `base` exceeds 1.
+    /// Share of draws that exceed 1 under the bounds `base`.
     pub above_one: Vec<AboveOne>,
 }
 
-/// The spread of the weights.
+/// Spread of weights.
 #[derive(Clone, Debug, Serialize)]
 pub struct Spread {
-    /// Whose weights they are.
+    /// Source of the weights.
     pub name: String,
-    /// How many spectra; none for a formula.
+    /// Number of spectra; `None` for a formula.
     pub count: Option<u64>,
-    /// The standard deviation of each weight.
+    /// Standard deviation of each weight.
     pub deviations: Vec<f64>,
-    /// The largest correlation of two weights.
+    /// Largest correlation of two weights.
     pub correlation: f64,
 }
 
-/// The covariance of accepted draws beside that of all candidates.
+/// Covariance of accepted draws relative to that of all candidates.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Shrinkage {
-    /// What multiplies the covariance.
+    /// Factor of the covariance.
     pub scale: f64,
-    /// How many draws.
+    /// Number of draws.
     pub draws: u64,
-    /// The share of candidates that were accepted.
+    /// Share of candidates that were accepted.
     pub acceptance: f64,
     /// det(covariance of accepted weights) / det(covariance of candidates).
     pub determinant_ratio: f64,
-    /// The standard error of the ratio, were the accepted weights normal.
+    /// Standard error of the ratio, were the accepted weights normal.
     pub error: f64,
 }
 
-/// Draws of a target LRV under the rule `base`.
+/// Draws of a target LRV under the bounds `base`.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct AboveOne {
-    /// The target.
+    /// Target LRV.
     pub lrv: f64,
-    /// How many draws.
+    /// Number of draws.
     pub draws: u64,
-    /// The share of them that scaling takes to 1 or above in some band.
+    /// Share of draws that scaling takes to 1 or above in some band.
     pub share: f64,
 }
 
@@ -97,7 +97,7 @@ pub(super) fn measure(bench: &Bench, name: &str, model: &Model) -> Result<Fideli
     })
 }
 
-/// Draws of the first engine.
+/// Draws with the first engine.
 fn accepted<'a>(bench: &Bench, recipe: &'a Recipe, draws: u64) -> Result<Moments<'a>, ReportError> {
     let mut moments = Moments::new(recipe.model());
     let range = Stream::named(bench.seed, "fidelity").draws(0..draws);
@@ -113,7 +113,7 @@ fn above_one(bench: &Bench, name: &str, model: &Model, draws: u64) -> Result<Vec
     }
     for step in 1..=9 {
         let lrv = 0.1 * f64::from(step);
-        bench.say(&format!("{name}: LRV {lrv:.1} under the rule base"))?;
+        bench.say(&format!("{name}: LRV {lrv:.1} under the bounds base"))?;
         let Ok(recipe) = Recipe::builder(model).lrv(lrv).bounds(Bounds::Base).build() else { continue };
         let range = Stream::named(bench.seed, "above one").draws(0..draws);
         let mut count = 0;
@@ -125,7 +125,7 @@ fn above_one(bench: &Bench, name: &str, model: &Model, draws: u64) -> Result<Vec
     Ok(all)
 }
 
-/// Through logarithms of pivots, since the determinants themselves may vanish.
+/// Ratio of determinants, through logarithms of pivots, since the determinants themselves may vanish.
 fn determinant_ratio(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     let log = |m: &DMatrix<f64>| m.symmetric_eigenvalues().iter().map(|v| v.ln()).sum::<f64>();
     (log(a) - log(b)).exp()
@@ -143,7 +143,7 @@ fn spread(name: &str, count: Option<u64>, covariance: &DMatrix<f64>) -> Spread {
     }
 }
 
-/// The weights of the data that a built-in model was fitted to, where those are built in too.
+/// Spread of the data that a built-in model was fitted to, where those are built in too.
 fn data(name: &str, model: &Model) -> Option<Spread> {
     if !name.starts_with("munsell-vrhel") {
         return None;

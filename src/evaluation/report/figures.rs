@@ -1,29 +1,29 @@
-//! The figures of a report: each with what to see in it, and what it was made of.
+//! Figures of a report: each with a caption and its sources.
 
 use super::chart::{Axis, COLOURS, Chart, GUIDE, Series, Style};
 use super::{Difficult, ModelReport, Point, Report};
 
-/// A figure.
+/// Figure of a report.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// The name of its file, without the extension.
+    /// Name of its file, without the extension.
     pub name: String,
-    /// The model, as an index into the report's; nothing where it is of no model.
+    /// The model, as an index into the report's; `None` where it is of no model.
     pub model: Option<usize>,
-    /// The section of the report that it belongs to, from 1.
+    /// Section of the report that it belongs to, from 1.
     pub section: usize,
     /// The plot.
     pub svg: String,
-    /// What to see.
+    /// Caption: what it shows.
     pub see: String,
-    /// What it was made of: numbers of draws, seed, engines, drivers, date.
+    /// Sources: numbers of draws, seed, engines, drivers, date.
     pub facts: String,
 }
 
-/// Cells of the histogram of p-values.
+/// Number of cells of the histogram of p-values.
 const BINS: usize = 20;
 
-/// All figures, in order.
+/// Makes all figures, in order.
 pub fn figures(report: &Report) -> Vec<Figure> {
     let mut all = Vec::new();
     for (index, model) in report.models.iter().enumerate() {
@@ -41,7 +41,7 @@ pub fn figures(report: &Report) -> Vec<Figure> {
     all
 }
 
-/// Engines with their drivers, the seed and the date: what any number depends on.
+/// Facts that any number depends on: engines with their drivers, the seed and the date.
 fn facts(report: &Report, numbers: &str) -> String {
     let engines = report.engines.iter().map(|e| e.description.as_str()).collect::<Vec<_>>().join("; ");
     format!("{numbers}. Seed {}. {engines}. {}.", report.seed, report.date)
@@ -53,7 +53,7 @@ struct Drawing<'a> {
     index: usize,
 }
 
-/// The quantities whose errors are told.
+/// Quantities whose errors are plotted.
 const QUANTITIES: [(&str, &str); 3] =
     [("mean spectrum", ""), ("covariance", " (relative to it)"), ("acceptance", "")];
 
@@ -142,7 +142,7 @@ impl Drawing<'_> {
         (replicates.clone().min().unwrap_or(0), replicates.max().unwrap_or(0))
     }
 
-    /// Where the bias of f32 would show.
+    /// Describes the number of draws at which the bias of f32 would show.
     fn floor(&self) -> String {
         let deviation = self.model.convergence.reference.deviation;
         let told = self.model.accuracy.variants.iter().filter(|v| v.nanoseconds.is_some()).map(|v| {
@@ -422,20 +422,20 @@ fn p_values(report: &Report) -> Figure {
     }
 }
 
-/// A name that any file system takes.
+/// Makes a name that any file system takes.
 fn file_stem(name: &str) -> String {
     let stem = std::path::Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
     stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
 }
 
-/// A number with its thousands set apart.
+/// Formats a number with its thousands set apart.
 pub(super) fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let groups: Vec<_> = digits.as_bytes().rchunks(3).rev().map(|g| String::from_utf8_lossy(g)).collect();
     groups.join(",")
 }
 
-/// A number to two digits, with a power of ten where it needs one.
+/// Formats a number to two digits, with a power of ten where it needs one.
 pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();

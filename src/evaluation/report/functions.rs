@@ -1,5 +1,5 @@
-//! The functions of Box-Muller on each engine, ours and built-in: how far they are from f64, what that does to
-//! candidates, and what they cost.
+//! Functions of Box-Muller on each engine, ours and built-in: their errors, the effect of those on candidates, and
+//! their cost.
 
 use std::time::Instant;
 
@@ -18,41 +18,41 @@ use crate::random::stream::Stream;
 use crate::recipe::Recipe;
 use crate::wgsl::{self, generator};
 
-/// Pairs of normals that a thread makes when they are timed.
+/// Number of pairs of normals that a thread makes when they are timed.
 const TIMED: u32 = 64;
 
-/// Threads when they are timed.
+/// Number of threads when they are timed.
 const THREADS: u32 = 1 << 15;
 
-/// One way to make normals on an engine.
+/// Functions that make normals on an engine.
 #[derive(Clone, Debug, Serialize)]
 pub struct Functions {
     /// The engine, as an index into the report's.
     pub engine: usize,
-    /// Whose functions they are.
+    /// Name of the functions.
     pub name: &'static str,
-    /// How many candidates were compared.
+    /// Number of candidates that were compared.
     pub candidates: u64,
-    /// The largest error of a radius, which reaches 6.76.
+    /// Largest error of a radius, which reaches 6.76.
     pub radius: f64,
-    /// The largest error of a sine or cosine.
+    /// Largest error of a sine or cosine.
     pub circle: f64,
-    /// The largest error of a normal.
+    /// Largest error of a normal.
     pub normal: f64,
-    /// The largest error of a candidate's value, where all else is computed in f64.
+    /// Largest error of a candidate's value, where all else is computed in f64.
     pub spectrum: f64,
     /// Candidates that are accepted and should not be, or the other way round, per million.
     pub flips_per_million: f64,
-    /// Nanoseconds a pair of normals, all cores of the engine at work.
+    /// Nanoseconds per pair of normals, with all cores of the engine at work.
     pub nanoseconds: f64,
 }
 
-/// A radius, a cosine and a sine.
+/// Radius, cosine and sine.
 type Polar = [f32; 3];
 
 const NAMES: [&str; 2] = ["own polynomials", "built-in log, sin, cos"];
 
-/// Writes radius, cosine and sine for each pair of words, in our way and in the textbooks'.
+/// Shader that writes radius, cosine and sine for each pair of words, in our way and in the textbooks'.
 const SHADER: &str = "
 @group(0) @binding(0) var<storage, read> words: array<vec2<u32>>;
 @group(0) @binding(1) var<storage, read_write> results: array<f32>;
@@ -116,7 +116,7 @@ pub(super) fn measure(bench: &Bench, recipe: &Recipe) -> Result<Vec<Functions>, 
     Ok(all)
 }
 
-/// The words of the normals of candidates: a pair of words for each pair of normals.
+/// Words of the normals of candidates: a pair of words for each pair of normals.
 fn words(seed: u64, components: usize, candidates: u64) -> Vec<[u32; 2]> {
     let stream = Stream::named(seed, "functions");
     let pairs = components.div_ceil(2);
@@ -127,7 +127,7 @@ fn words(seed: u64, components: usize, candidates: u64) -> Vec<[u32; 2]> {
     (0..candidates).into_par_iter().flat_map_iter(of).collect()
 }
 
-/// What our functions and the built-in ones make of the words, and nanoseconds a pair of normals of each.
+/// Results of our functions and of the built-in ones for the words, and nanoseconds per pair of normals of each.
 fn results(target: &Subject, words: &[[u32; 2]]) -> Option<([Vec<Polar>; 2], [f64; 2])> {
     let engine = target.engine()?;
     Some(match engine.device() {
@@ -150,7 +150,7 @@ fn on_cpu(words: &[[u32; 2]]) -> ([Vec<Polar>; 2], [f64; 2]) {
     ([make(&own), make(&builtin)], [time_cpu(own), time_cpu(builtin)])
 }
 
-/// In lanes, as the engine draws, but with the instructions that every processor has.
+/// Times a function in lanes, as the engine draws, but with the instructions that every processor has.
 fn time_cpu(f: impl Fn(u32, u32) -> Polar + Sync) -> f64 {
     const LANES: u32 = 16;
     let run = || {

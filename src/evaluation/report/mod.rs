@@ -1,8 +1,8 @@
-//! The report: what draws cost, how good they are, and how they behave at the edges, on one machine and for its
+//! Report on the cost of draws, their quality, and their behaviour in extreme cases, on one machine and for its
 //! models.
 //!
-//! [`measure`] makes the numbers, which are a document of their own ([`Report`], as JSON); [`page`] makes of them one
-//! page that needs nothing else, and [`figures`] its plots. Every engine is judged by a reference in f64 that shares no
+//! [`measure`] makes the numbers, which are a document of their own ([`Report`], as JSON); [`page()`] makes of them one
+//! page that needs nothing else, and [`figures()`] its plots. Every engine is judged by a reference in f64 that shares no
 //! random word with it, and, value by value, by the f64 draw of the same words.
 
 mod accuracy;
@@ -41,7 +41,7 @@ use crate::model::Model;
 use crate::recipe::{Recipe, RecipeError};
 use engines::Subject;
 
-/// How much to measure.
+/// Amount of measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Effort {
@@ -54,7 +54,7 @@ pub enum Effort {
 }
 
 impl Effort {
-    /// One of three values.
+    /// Chooses one of three values.
     fn pick<T>(self, quick: T, usual: T, full: T) -> T {
         match self {
             Effort::Quick => quick,
@@ -64,20 +64,20 @@ impl Effort {
     }
 }
 
-/// What to report on.
+/// Subjects of a report.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Models, and what to call them.
+    /// Models, with their names.
     pub models: Vec<(String, Model)>,
-    /// What draws in f32; the CPU in f64 is always there beside it.
+    /// Engines that draw in f32; the CPU in f64 is always there beside them.
     pub engines: Vec<EngineChoice>,
-    /// How much to measure.
+    /// Amount of measurement.
     pub effort: Effort,
-    /// The seed of all random numbers.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// Why there is no report.
+/// Error returned where a report cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
@@ -87,7 +87,7 @@ pub enum ReportError {
     /// A model has no plain draws.
     #[error(transparent)]
     Recipe(#[from] RecipeError),
-    /// The caller's watch said so.
+    /// The caller's watch asked for an end.
     #[error("stopped")]
     Stopped,
     /// A plot cannot be drawn.
@@ -95,46 +95,47 @@ pub enum ReportError {
     Plot(String),
 }
 
-/// Says from time to time what is being done; `false` from it ends the work with [`ReportError::Stopped`].
+/// Callback that hears from time to time what is being done; `false` from it ends the work with
+/// [`ReportError::Stopped`].
 pub type Watch<'a> = &'a dyn Fn(&str) -> bool;
 
-/// All numbers.
+/// All measurements.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The version of the program.
+    /// Version of the program.
     pub version: &'static str,
-    /// When the measurements began, UTC.
+    /// Time at which the measurements began, UTC.
     pub date: String,
-    /// How long they took, seconds.
+    /// Duration of the measurements, seconds.
     pub seconds: f64,
-    /// How much was measured.
+    /// Amount of measurement.
     pub effort: Effort,
-    /// The seed of all random numbers.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// The cores that the operating system gives.
+    /// Number of cores that the operating system gives.
     pub cores: usize,
-    /// What drew.
+    /// Engines that drew.
     pub engines: Vec<EngineFacts>,
-    /// What was found for each model.
+    /// Results for each model.
     pub models: Vec<ModelReport>,
-    /// The generator, and the distribution of draws.
+    /// Tests of the generator, and of the distribution of draws.
     pub randomness: Randomness,
-    /// The stiff and extreme cases, for each engine that ran them.
+    /// Stiff and extreme cases, for each engine that ran them.
     pub stress: Vec<StressRun>,
 }
 
-/// What was found for a model.
+/// Results for a model.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModelReport {
-    /// What the model is called.
+    /// Name of the model.
     pub name: String,
-    /// Illuminants or reflectances.
+    /// Kind of its spectra: illuminants or reflectances.
     pub kind: crate::SpectrumKind,
-    /// The wavelengths, nm.
+    /// Wavelengths, nm.
     pub grid: String,
-    /// The number of bands.
+    /// Number of bands.
     pub bands: usize,
-    /// The number of components.
+    /// Number of components.
     pub components: usize,
     /// Statistical error against run time.
     pub convergence: Convergence,
@@ -146,16 +147,16 @@ pub struct ModelReport {
     pub fidelity: Fidelity,
 }
 
-/// The stiff and extreme cases on an engine.
+/// Stiff and extreme cases on an engine.
 #[derive(Clone, Debug, Serialize)]
 pub struct StressRun {
     /// The engine, as an index into [`Report::engines`].
     pub engine: usize,
-    /// What came of each case.
+    /// Outcome of each case.
     pub outcomes: Vec<Outcome>,
 }
 
-/// What all measurements share.
+/// State that all measurements share.
 struct Bench<'a> {
     targets: Vec<Subject>,
     effort: Effort,
@@ -214,7 +215,8 @@ fn report_model(bench: &Bench, name: &str, model: &Model) -> Result<ModelReport,
     })
 }
 
-/// Compiling some forty shaders would take most of a quick report: that runs the cases on the CPU alone.
+/// Runs the stiff and extreme cases: on the CPU alone in a quick report, of which compiling some forty shaders would
+/// take most of the time.
 fn stress(bench: &Bench) -> Result<Vec<StressRun>, ReportError> {
     let mut runs = Vec::new();
     for (index, target) in bench.targets.iter().enumerate() {

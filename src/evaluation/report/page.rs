@@ -1,4 +1,4 @@
-//! The report as one page of HTML: text, tables and plots, and nothing from elsewhere.
+//! The report as one page of HTML: text, tables and plots, without any external resource.
 
 use std::fmt::Write;
 
@@ -20,7 +20,7 @@ th{background:#f4f5f7;font-weight:600}td.text,th.text{text-align:left;max-width:
 white-space:normal}\
 .good{color:#00694e}.bad{color:#b3261e;font-weight:600}caption{text-align:left;padding:.4em 0;color:#5b626c}";
 
-/// The page, with these figures in it.
+/// Writes the page, with these figures in it.
 pub fn page(report: &Report, figures: &[Figure]) -> String {
     let mut html = String::new();
     let title = report.models.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -117,7 +117,7 @@ fn plots(figures: &[Figure], section: usize, model: Option<usize>) -> String {
     html + "</div>\n"
 }
 
-/// A table. The first `texts` columns are text.
+/// Writes a table. The first `texts` columns are text.
 fn table(caption: &str, head: &[&str], texts: usize, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let class = |i: usize| if i < texts { " class=\"text\"" } else { "" };
     let mut html = format!("<table><caption>{caption}</caption><tr>");
@@ -291,7 +291,7 @@ fn randomness(report: &Report) -> String {
     html
 }
 
-/// The checks of draws, a row for each scenario and check, a column for each engine.
+/// Writes the checks of draws, a row for each scenario and check, a column for each engine.
 fn checks(report: &Report) -> String {
     let randomness = &report.randomness;
     let mut engines: Vec<usize> = randomness.checks.iter().map(|c| c.engine).collect();
@@ -335,7 +335,7 @@ fn verdict(check: &CheckRow) -> String {
     }
 }
 
-/// The smallest errors that the checks see.
+/// Writes the smallest errors that the checks see.
 fn smallest(report: &Report) -> String {
     let Some(s) = report.randomness.smallest else { return String::new() };
     format!(
@@ -394,7 +394,7 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Text with its powers raised: 10^-9.
+/// Raises the powers in a text: 10^-9.
 fn powers(text: &str) -> String {
     let text = escape(text);
     let mut parts = text.split('^');

@@ -12,38 +12,39 @@ use crate::random::philox::{KNOWN_ANSWERS, philox};
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
 
-/// Normals of a candidate that are judged.
+/// Number of normals of a candidate that are tested.
 const NORMALS: usize = 6;
 
-/// The generator, and the distribution of draws.
+/// Tests of the generator, and of the distribution of draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct Randomness {
-    /// How many vectors of Random123 the generator gives, and of how many.
+    /// Number of Random123's test vectors that the generator reproduces, and of all.
     pub known_answers: [usize; 2],
-    /// Draws that each engine makes to the same bits as the CPU in f32, and of how many.
+    /// For each engine on an adapter, its index, the number of draws with the same bits as the CPU's in f32, and the
+    /// number of all compared.
     pub same_bits: Vec<(usize, u64, u64)>,
-    /// Seeds of the generator that are judged.
+    /// Number of seeds of the generator that are tested.
     pub seeds: u64,
-    /// Draws of each.
+    /// Number of draws of each seed.
     pub draws: u64,
     /// Comparisons of each kind, over all seeds.
     pub groups: Vec<GroupRow>,
-    /// Of all comparisons: whether their p-values are uniform.
+    /// p-value of all comparisons together: whether their p-values are uniform.
     pub p_of_all: f64,
-    /// The battery of the tests, on each engine and model.
+    /// Checks of the tests' battery, on each engine and model.
     pub checks: Vec<CheckRow>,
-    /// Draws of each check.
+    /// Number of draws of each check.
     pub check_draws: u64,
-    /// The probability that sound draws fail a check.
+    /// Probability that sound draws fail a check.
     pub false_alarms: f64,
-    /// What the checks see, for the first model.
+    /// Smallest errors that the checks see, for the first model.
     pub smallest: Option<Smallest>,
 }
 
 /// Comparisons of one kind.
 #[derive(Clone, Debug, Serialize)]
 pub struct GroupRow {
-    /// What is compared.
+    /// Name of the comparison.
     pub name: &'static str,
     /// Their p-values.
     pub p_values: Vec<f64>,
@@ -54,17 +55,17 @@ pub struct GroupRow {
 pub struct CheckRow {
     /// The engine, as an index into the report's.
     pub engine: usize,
-    /// The model, and what is drawn of it.
+    /// Model and recipe.
     pub scenario: String,
-    /// The check.
+    /// Name of the check.
     pub check: &'static str,
-    /// What it compares.
+    /// Values that it compares, in words.
     pub compares: &'static str,
-    /// How many comparisons it makes.
+    /// Number of comparisons.
     pub comparisons: usize,
-    /// The probability that sound draws look as bad.
+    /// Probability that sound draws look as bad.
     pub p: f64,
-    /// What is wrong, if anything is.
+    /// Description of a fault, if there is one.
     pub alarm: Option<String>,
 }
 
@@ -100,7 +101,8 @@ pub(super) fn measure(bench: &Bench, models: &[(String, Model)]) -> Result<Rando
     })
 }
 
-/// The plain draws of each model, and those with so little covariance that none is rejected and each weight is normal.
+/// Scenarios: the plain draws of each model, and those with so little covariance that none is rejected and each
+/// weight is normal.
 fn scenarios(models: &[(String, Model)]) -> Vec<Scenario> {
     let scenario = |name: &str, what: &str, model: &Model, scale| Scenario {
         name: format!("{name}{what}"),
@@ -158,7 +160,7 @@ fn checks(
     Ok((rows, smallest))
 }
 
-/// Draws of the first model by each engine, held bit for bit against the CPU's.
+/// Compares draws of the first model by each engine, bit for bit, with the CPU's.
 fn same_bits(bench: &Bench, models: &[(String, Model)]) -> Result<Vec<(usize, u64, u64)>, ReportError> {
     const DRAWS: u64 = 100_000;
     let recipe = Recipe::builder(&models[0].1).build()?;

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Report;
 use super::figures::number;
 
-/// What is right and what is not, in numbers.
+/// Counts of right answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Verdict {
     /// Stiff and extreme cases with their right answer, and all.
@@ -19,7 +19,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Whether nothing is wrong.
+    /// Whether all answers are right.
     pub fn is_good(&self) -> bool {
         [self.cases, self.checks, self.answers].iter().all(|[good, all]| good == all)
     }
@@ -38,7 +38,7 @@ impl fmt::Display for Verdict {
 }
 
 impl Report {
-    /// What is right and what is not.
+    /// Counts the right answers.
     pub fn verdict(&self) -> Verdict {
         let outcomes = || self.stress.iter().flat_map(|run| &run.outcomes);
         let checks = &self.randomness.checks;
@@ -49,7 +49,7 @@ impl Report {
         }
     }
 
-    /// The outcome in a few lines for a terminal.
+    /// Writes the outcome in a few lines for a terminal.
     pub fn summary(&self) -> String {
         let mut text = String::new();
         for model in &self.models {

@@ -1,4 +1,4 @@
-//! The checks: each holds a sample against a reference and says how likely sound draws would differ as much.
+//! Checks: each compares a sample with a reference, and gives the probability that sound draws differ as much.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -7,51 +7,51 @@ use statrs::function::erf::erfc;
 use super::Finding;
 use super::sample::Sample;
 
-/// The probability that sound draws fail any of [`RUNS`] checks.
+/// Probability that sound draws fail any of [`RUNS`] checks.
 pub const FALSE_ALARMS: f64 = 1e-6;
 
-/// How many checks are run on sound draws, at most; the tests count theirs.
+/// Largest number of checks that are run on sound draws; the tests count theirs.
 pub const RUNS: usize = 180;
 
-/// The probability that an error as large as [`smallest_errors`] says goes unseen.
+/// Probability of missing an error as large as [`smallest_errors`] says.
 pub const MISSED: f64 = 1e-3;
 
-/// A band this close to a bound is at the edge.
+/// Distance from a bound below which a band is at the edge.
 pub const EDGE: f64 = 1e-3;
 
-/// A check: what it holds a sample against, and how.
+/// Check of a sample against a reference.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
-    /// What it is called.
+    /// Name of the check.
     pub name: &'static str,
-    /// What it holds a sample against.
+    /// Reference that it needs.
     pub against: Against,
-    /// What it compares, in words.
+    /// Values that it compares, in words.
     pub compares: &'static str,
     find: fn(&Sample, &Sample) -> Finding,
 }
 
 impl Check {
-    /// Holds a sample against a reference.
+    /// Compares a sample with a reference.
     pub fn run(&self, sample: &Sample, reference: &Sample) -> Finding {
         (self.find)(sample, reference)
     }
 
-    /// The check of that name.
+    /// Returns the check of this name.
     pub fn named(name: &str) -> &'static Check {
         let all = CHECKS.iter().chain([&GAUSSIAN, &LOW_BITS]);
         all.into_iter().find(|check| check.name == name).expect("there is a check of that name")
     }
 }
 
-/// What a check holds a sample against.
+/// Kind of reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Against {
-    /// The oracle's sample, or nothing.
+    /// The oracle's sample.
     Oracle,
     /// Another stream of the same sampler.
     OtherStream,
-    /// The same stream 2^32 draws on.
+    /// The stream of the sample, 2^32 draws on.
     FarIndex,
     /// The library's f64 draws of the same indices.
     Library,
@@ -66,7 +66,7 @@ const fn check(
     Check { name, against, compares, find }
 }
 
-/// The checks that suit every scenario.
+/// Checks that suit every scenario.
 pub static CHECKS: [Check; 10] = [
     check("acceptance", Against::Oracle, "the share of candidates that are accepted", acceptance),
     check("means", Against::Oracle, "the mean of every band and weight", means),
@@ -90,11 +90,11 @@ pub static CHECKS: [Check; 10] = [
     ),
 ];
 
-/// For scenarios that reject nothing, whose weights have a formula.
+/// Check for scenarios that reject nothing, whose weights have a formula.
 pub static GAUSSIAN: Check =
     check("gaussian", Against::Oracle, "the distribution of every weight with its Gaussian", gaussian);
 
-/// For draws in f64 of a model with a diagonal covariance; f32 has no such bits in its results.
+/// Check for draws in f64 of a model with a diagonal covariance; f32 has no such bits in its results.
 pub static LOW_BITS: Check = check(
     "low bits",
     Against::Oracle,
@@ -102,13 +102,13 @@ pub static LOW_BITS: Check = check(
     low_bits,
 );
 
-/// How many standard errors one of several comparisons may be off.
+/// Number of standard errors that one of several comparisons may be off.
 pub fn sigmas(comparisons: usize) -> f64 {
     -Normal::standard().inverse_cdf(FALSE_ALARMS / RUNS as f64 / comparisons as f64 / 2.0)
 }
 
-/// How far two distribution functions may be apart, times the root of the effective size, by the inequality of
-/// Dvoretzky, Kiefer & Wolfowitz with Massart's constant (for two samples of equal size: Wei & Dudley 2012).
+/// Largest accepted distance of two distribution functions, times the root of the effective size, by the inequality
+/// of Dvoretzky, Kiefer & Wolfowitz with Massart's constant (for two samples of equal size: Wei & Dudley 2012).
 fn supremum(comparisons: usize) -> f64 {
     ((2.0 * RUNS as f64 * comparisons as f64 / FALSE_ALARMS).ln() / 2.0).sqrt()
 }
@@ -129,8 +129,8 @@ pub(super) fn two_sided(z: f64) -> f64 {
     erfc(z.abs() / std::f64::consts::SQRT_2)
 }
 
-/// The probability that an empirical distribution of effective size n is `distance` or more from the true one, from
-/// `root` = sqrt(n) times it: the limit of Kolmogorov.
+/// Probability that an empirical distribution of effective size n is `distance` or more from the true one, by
+/// Kolmogorov's limit: `root` is sqrt(n) times the distance.
 pub(super) fn kolmogorov(root: f64) -> f64 {
     if root < 0.2 {
         return 1.0; // to 1e-12; the series would need many terms
@@ -155,7 +155,7 @@ impl Finding {
     }
 }
 
-/// The share of candidates that are accepted.
+/// Compares the shares of candidates that are accepted.
 fn acceptance(sample: &Sample, reference: &Sample) -> Finding {
     let mut finding = Finding::default();
     let share = |s: &Sample| {
@@ -166,7 +166,7 @@ fn acceptance(sample: &Sample, reference: &Sample) -> Finding {
     finding
 }
 
-/// The mean of every band and of every weight.
+/// Compares the mean of every band and of every weight.
 fn means(sample: &Sample, reference: &Sample) -> Finding {
     let mut finding = Finding::default();
     for (what, a, b) in
@@ -179,7 +179,7 @@ fn means(sample: &Sample, reference: &Sample) -> Finding {
     finding
 }
 
-/// The covariance of every two weights, and the variance of each.
+/// Compares the covariance of every two weights, and the variance of each.
 fn covariance(sample: &Sample, reference: &Sample) -> Finding {
     let mut finding = Finding::default();
     let k = sample.weights.len();
@@ -201,7 +201,7 @@ fn sorted(x: &[f64]) -> Vec<f64> {
     x
 }
 
-/// The distribution of every weight (two-sample Kolmogorov-Smirnov).
+/// Compares the distribution of every weight (two-sample Kolmogorov-Smirnov).
 fn distribution(sample: &Sample, reference: &Sample) -> Finding {
     let mut finding = Finding::default();
     let (n, m) = (sample.len(), reference.len());
@@ -231,7 +231,7 @@ pub(super) fn distance(x: &[f64], cdf: impl Fn(f64) -> f64) -> f64 {
     gaps.fold(0.0, |d: f64, (i, p)| d.max(p - i as f64 / n).max((i + 1) as f64 / n - p))
 }
 
-/// The distribution of every weight against the Gaussian that it is where nothing is rejected.
+/// Compares the distribution of every weight with the Gaussian that it has where nothing is rejected.
 fn gaussian(sample: &Sample, _: &Sample) -> Finding {
     let mut finding = Finding::default();
     let (parts, scale) = (sample.scenario.model.parts(), sample.scenario.scale);
@@ -246,7 +246,7 @@ fn gaussian(sample: &Sample, _: &Sample) -> Finding {
     finding
 }
 
-/// The share of draws that come close to 0, that come close to 1, and that reach 1.
+/// Compares the shares of draws that come close to 0, that come close to 1, and that reach 1.
 fn edges(sample: &Sample, reference: &Sample) -> Finding {
     let mut finding = Finding::default();
     let shares = |s: &Sample| {
@@ -271,14 +271,14 @@ fn edges(sample: &Sample, reference: &Sample) -> Finding {
     finding
 }
 
-/// Whether every value is above 0 and below its limit. No chance is involved.
+/// Checks that every value is above 0 and below its limit. No chance is involved.
 fn physical(sample: &Sample, _: &Sample) -> Finding {
     let limit = sample.scenario.limit();
     let wrong = sample.bands.iter().flatten().find(|&&s| !(s > 0.0 && s < limit));
     Finding { fault: wrong.map(|value| format!("a value of {value}")), ..Finding::default() }
 }
 
-/// Whether two groups of series of equal length are uncorrelated.
+/// Checks that two groups of series of equal length are uncorrelated.
 fn uncorrelated(what: &str, a: &[&[f64]], b: &[&[f64]]) -> Finding {
     let mut finding = Finding::default();
     for (i, x) in a.iter().enumerate() {
@@ -291,7 +291,7 @@ fn uncorrelated(what: &str, a: &[&[f64]], b: &[&[f64]]) -> Finding {
     finding
 }
 
-/// The correlation of two series that vary.
+/// Correlation of two series that vary.
 pub(super) fn correlation(x: &[f64], y: &[f64]) -> f64 {
     let ((mx, vx), (my, vy)) = (estimate(x), estimate(y));
     let product = x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum::<f64>();
@@ -299,13 +299,13 @@ pub(super) fn correlation(x: &[f64], y: &[f64]) -> f64 {
     product / (n * n * (vx * vy).sqrt())
 }
 
-/// The weights and the attempts, where those vary.
+/// Series of the weights and of the attempts, where those vary.
 fn series<'a>(sample: &'a Sample) -> Vec<&'a [f64]> {
     let varies = |x: &&'a [f64]| x.iter().any(|v| *v != x[0]);
     sample.weights.iter().map(Vec::as_slice).chain([sample.attempts.as_slice()]).filter(varies).collect()
 }
 
-/// The correlation between draws that follow each other.
+/// Checks the correlation between consecutive draws.
 fn neighbours(sample: &Sample, _: &Sample) -> Finding {
     let all = series(sample);
     let first: Vec<_> = all.iter().map(|x| &x[..x.len() - 1]).collect();
@@ -313,12 +313,12 @@ fn neighbours(sample: &Sample, _: &Sample) -> Finding {
     uncorrelated("neighbours", &first, &next)
 }
 
-/// The correlation between two samples, draw by draw.
+/// Checks the correlation between two samples, draw by draw.
 fn independence(sample: &Sample, other: &Sample) -> Finding {
     uncorrelated("two samples", &series(sample), &series(other))
 }
 
-/// Whether the first draws are those of the library in f64: as many as the reference has. No chance is involved.
+/// Checks that the first draws are those of the library in f64: as many as the reference has. No chance is involved.
 fn known_draws(sample: &Sample, library: &Sample) -> Finding {
     let mut flips = 0;
     let fault = (0..library.len()).find_map(|i| {
@@ -335,8 +335,8 @@ fn known_draws(sample: &Sample, library: &Sample) -> Finding {
     Finding { fault: fault.or(flipped), ..Finding::default() }
 }
 
-/// Whether uniforms have random bits below the 24th: those of a radius and of an angle, won back from the first two
-/// weights.
+/// Checks that uniforms have random bits below the 24th: those of a radius and of an angle, recovered from the first
+/// two weights.
 fn low_bits(sample: &Sample, _: &Sample) -> Finding {
     let mut finding = Finding::default();
     let (parts, scale) = (sample.scenario.model.parts(), sample.scenario.scale);
@@ -356,28 +356,28 @@ fn low_bits(sample: &Sample, _: &Sample) -> Finding {
     finding
 }
 
-/// The smallest errors that the checks see in all but one of 1,000 cases.
+/// Smallest errors that the checks see in all but one of 1,000 cases.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Smallest {
-    /// Of the acceptance, in parts of itself.
+    /// Error of the acceptance, relative to it.
     pub acceptance: f64,
-    /// Of a mean, in standard deviations.
+    /// Error of a mean, in standard deviations.
     pub mean: f64,
-    /// Of a correlation between weights.
+    /// Error of a correlation between weights.
     pub correlation: f64,
-    /// Of a Gaussian's variance, in parts of itself.
+    /// Error of a Gaussian's variance, relative to it.
     pub variance: f64,
-    /// Of a distribution function, where it is largest, against the oracle.
+    /// Error of a distribution function, where it is largest, against the oracle.
     pub distribution: f64,
-    /// The same against the formula.
+    /// Error of a distribution function, where it is largest, against the formula.
     pub gaussian: f64,
-    /// Of the share of draws at an edge, in parts of itself where it is 1 %.
+    /// Error of the share of draws at an edge, relative to it, where it is 1 %.
     pub edge: f64,
-    /// Of a correlation between neighbours, streams, or indices 2^32 apart.
+    /// Correlation between neighbours, streams, or indices 2^32 apart.
     pub independence: f64,
 }
 
-/// What the checks see of two samples like this one.
+/// Computes the smallest errors that the checks see in samples like this one.
 pub fn smallest_errors(sample: &Sample) -> Smallest {
     let (n, k) = (sample.len() as f64, sample.weights.len());
     let power = -Normal::standard().inverse_cdf(MISSED);

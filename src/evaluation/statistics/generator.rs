@@ -1,4 +1,5 @@
-//! The generator alone: whether its normals are normal, and independent of everything that they should be.
+//! Tests of the generator alone: its normals must be normal, and independent of each other across draws, attempts,
+//! streams and seeds.
 //!
 //! Every comparison is of one normal of a candidate, over many draws. Together their p-values must be uniform, which
 //! says more than that none of them is small.
@@ -10,19 +11,20 @@ use super::checks::{correlation, distance, kolmogorov, two_sided};
 use crate::random::real::Real;
 use crate::random::stream::Stream;
 
-/// Cells of equal probability in a chi-squared test.
+/// Number of cells of equal probability in a chi-squared test.
 const CELLS: usize = 256;
 
 /// Comparisons of one kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
-    /// What is compared.
+    /// Name of the comparison.
     pub name: &'static str,
-    /// How likely sound normals differ by as much, for each comparison.
+    /// Probability that sound normals differ by as much, for each comparison.
     pub p_values: Vec<f64>,
 }
 
-/// The first `components` normals of an attempt of `count` draws from index `first` on, in f32: a series for each.
+/// Returns the first `components` normals of an attempt of `count` draws from index `first` on, in f32: a series for
+/// each.
 pub fn normals(stream: Stream, components: usize, first: u64, attempt: u32, count: u64) -> Vec<Vec<f64>> {
     let series = |j: usize| {
         let normal = |i: u64| {
@@ -35,7 +37,7 @@ pub fn normals(stream: Stream, components: usize, first: u64, attempt: u32, coun
     (0..components).into_par_iter().map(series).collect()
 }
 
-/// The comparisons of the first `components` normals of `count` draws of a seed.
+/// Compares the first `components` normals of `count` draws of a seed.
 pub fn uniformity(seed: u64, components: usize, count: u64) -> Vec<Group> {
     let make = |stream, first, attempt| normals(stream, components, first, attempt, count);
     let stream = Stream::named(seed, "generator");
@@ -96,7 +98,7 @@ fn uncorrelated(x: &[f64], y: &[f64]) -> f64 {
     two_sided(correlation(x, y) * (x.len() as f64).sqrt())
 }
 
-/// The p-value of the p-values, which are uniform where all is sound.
+/// p-value of the p-values, which are uniform where all is sound.
 pub fn of_all(p_values: &[f64]) -> f64 {
     kolmogorov((p_values.len() as f64).sqrt() * distance(p_values, |p| p))
 }

@@ -1,6 +1,6 @@
-//! Whether draws have the distribution that they should.
+//! Statistical checks of the distribution of draws.
 //!
-//! Samples of an engine are held against an oracle that shares no code with it, by checks that each have a stated rate
+//! Samples of an engine are compared with an oracle that shares no code with it, by checks that each have a stated rate
 //! of false alarms and a stated smallest error. Tests run them on fixed seeds, and on samplers that are broken in one
 //! way each, every one of which they catch; the report runs them on its user's adapter and model.
 //!
@@ -24,17 +24,17 @@ pub use tinted::tinted;
 
 use crate::random::stream::Stream;
 
-/// Draws that are compared one by one with the library's.
+/// Number of draws that are compared one by one with the library's.
 pub const KNOWN: u64 = 4096;
 
-/// What the comparisons of a check came to.
+/// Result of the comparisons of a check.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Finding {
-    /// For each comparison, how likely sound draws differ by as much.
+    /// Probability that sound draws differ by as much, for each comparison.
     pub p_values: Vec<f64>,
-    /// The least likely of them, in words.
+    /// The least likely comparison, in words.
     pub worst: String,
-    /// What no chance explains.
+    /// Fault that chance cannot explain.
     pub fault: Option<String>,
 }
 
@@ -47,7 +47,7 @@ impl Finding {
         self.p_values.push(p);
     }
 
-    /// The probability that sound draws look as bad in any of the comparisons.
+    /// Probability that sound draws look as bad in any of the comparisons.
     pub fn p(&self) -> f64 {
         let comparisons = self.p_values.len() as f64;
         match &self.fault {
@@ -56,14 +56,14 @@ impl Finding {
         }
     }
 
-    /// What differs, where it differs by more than chance.
+    /// Describes the difference, where it is more than chance.
     pub fn alarm(&self) -> Option<String> {
         let unlikely = || (self.p() < FALSE_ALARMS / RUNS as f64).then(|| self.worst.clone());
         self.fault.clone().or_else(unlikely)
     }
 }
 
-/// A sampler: the draws of a stream from an index on, so many.
+/// Function that draws a sample: from a stream, a first index and a number of draws.
 pub type SampleFn<'s, 'a> = &'s dyn Fn(Stream, u64, u64) -> Sample<'a>;
 
 /// Runs every check that suits the scenario of `oracle` on as many draws of `sampler` as the oracle has, of streams

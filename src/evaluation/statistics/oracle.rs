@@ -1,7 +1,7 @@
-//! The oracle: the same distributions drawn in another way. Its random words come from another crate in sequence, its
-//! normals from the inverse of the normal distribution function rather than from Box-Muller, its weights from an
-//! eigen-decomposition, and the rules are written out as the appendix has them. Of the library it uses the model's
-//! parts and the colorimetric tables.
+//! Oracle: the distributions of the library, drawn in another way. Its random words come from another crate in
+//! sequence, its normals from the inverse of the normal distribution function rather than from Box-Muller, its
+//! weights from an eigen-decomposition, and the bounds are written out as the appendix has them. Of the library it
+//! uses the model's parts and the colorimetric tables.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand_philox::{Philox, u32_to_unit_f64};
@@ -13,10 +13,10 @@ use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::program::Bounds;
 
-/// Draws that share a generator.
+/// Number of draws that share a generator.
 const CHUNK: u64 = 1024;
 
-/// `count` draws of a scenario.
+/// Makes `count` draws of a scenario.
 pub fn sample(scenario: &Scenario, seed: u64, count: u64) -> Sample<'_> {
     let oracle = Oracle::new(scenario);
     let draws: Vec<_> = (0..count.div_ceil(CHUNK))
@@ -31,9 +31,9 @@ pub fn sample(scenario: &Scenario, seed: u64, count: u64) -> Sample<'_> {
 
 struct Oracle<'a> {
     scenario: &'a Scenario,
-    /// Any matrix whose product with its transpose is the covariance.
+    /// A matrix whose product with its transpose is the covariance.
     root: DMatrix<f64>,
-    /// The light that the eye sees of each band, and of a perfect white.
+    /// Luminance of each band of a perfect white under D65; `white` is their sum.
     luminous: Vec<f64>,
     white: f64,
     normal: Normal,

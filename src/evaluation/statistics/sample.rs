@@ -1,4 +1,4 @@
-//! Scenarios, which are what is drawn, and samples, which are what came of it.
+//! Scenarios, which are models with a recipe, and samples, which are their draws.
 
 use rayon::prelude::*;
 
@@ -11,24 +11,24 @@ use crate::program::Bounds;
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
 
-/// A model under a rule.
+/// A model with a recipe.
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    /// What it is called.
+    /// Name of the scenario.
     pub name: String,
-    /// What is drawn from.
+    /// Model that is drawn from.
     pub model: Model,
-    /// The target LRV, and what must be physical.
+    /// Target LRV, and the bounds that apply with it.
     pub target: Option<(f64, Bounds)>,
-    /// What multiplies the covariance.
+    /// Factor of the covariance.
     pub scale: f64,
 }
 
-/// Small enough that no candidate is ever rejected: the weights are as normal as they were drawn.
+/// Scale of the covariance at which no candidate is ever rejected: the weights are as normal as they were drawn.
 const UNTRUNCATED: f64 = 0.01;
 
 impl Scenario {
-    /// Every kind of recipe, on the built-in models and on one that has what no fit gives.
+    /// Every kind of recipe, on the built-in models and on one with properties that no fit gives.
     pub fn all() -> Vec<Scenario> {
         let reflectances = || Model::builtin("munsell-vrhel").expect("it is built in");
         let daylights = Model::builtin("granada").expect("it is built in");
@@ -48,12 +48,12 @@ impl Scenario {
         ]
     }
 
-    /// The one of that name among all.
+    /// Returns the scenario of this name.
     pub fn named(name: &str) -> Scenario {
         Scenario::all().into_iter().find(|s| s.name == name).expect("there is a scenario of that name")
     }
 
-    /// What to draw with.
+    /// Recipe of the scenario.
     pub fn recipe(&self) -> Recipe {
         let recipe = Recipe::builder(&self.model).covariance_scale(self.scale);
         let recipe = match self.target {
@@ -68,7 +68,7 @@ impl Scenario {
         self.scale == UNTRUNCATED
     }
 
-    /// What every value of an output is below.
+    /// Upper limit of every value of an output.
     pub fn limit(&self) -> f64 {
         match (self.model.kind(), self.target) {
             (SpectrumKind::Illuminant, _) | (_, Some((_, Bounds::Base))) => f64::INFINITY,
@@ -77,24 +77,24 @@ impl Scenario {
     }
 }
 
-/// One spectrum, and how many candidates it took.
+/// One spectrum, and the number of candidates it took.
 pub type ScenarioDraw = (Vec<f64>, u32);
 
 /// Draws of a scenario. A series is the values of one band, weight or count over the draws, in order.
 #[derive(Clone)]
 pub struct Sample<'a> {
-    /// What was drawn.
+    /// Scenario of the draws.
     pub scenario: &'a Scenario,
     /// A series for each band.
     pub bands: Vec<Vec<f64>>,
     /// The spectra projected onto the model's basis: weights, or where spectra are scaled something linear in them.
     pub weights: Vec<Vec<f64>>,
-    /// How many candidates each draw took.
+    /// Number of candidates that each draw took.
     pub attempts: Vec<f64>,
 }
 
 impl<'a> Sample<'a> {
-    /// The sample of these draws.
+    /// Makes the sample of these draws.
     pub fn new(scenario: &'a Scenario, draws: &[ScenarioDraw]) -> Sample<'a> {
         let model = &scenario.model;
         let weights: Vec<_> = draws.par_iter().map(|(spectrum, _)| model.project(spectrum)).collect();
@@ -106,7 +106,7 @@ impl<'a> Sample<'a> {
         }
     }
 
-    /// The sample of draws `first`, `first + 1`, ... that `draw` makes one by one.
+    /// Makes the sample of draws `first`, `first + 1`, ... by calling `draw` for each.
     pub fn of(
         scenario: &'a Scenario,
         first: u64,
@@ -117,7 +117,7 @@ impl<'a> Sample<'a> {
         Sample::new(scenario, &draws)
     }
 
-    /// The draws of an engine.
+    /// Makes a sample with an engine.
     pub fn of_engine(
         scenario: &'a Scenario,
         engine: &Engine,
@@ -136,7 +136,7 @@ impl<'a> Sample<'a> {
         Ok(Sample::new(scenario, &draws))
     }
 
-    /// The f64 draws of the library.
+    /// Makes a sample with the library in f64.
     pub fn of_library(scenario: &'a Scenario, stream: Stream, first: u64, count: u64) -> Sample<'a> {
         let oracle = scenario.recipe().scalar_sampler();
         Sample::of(scenario, first, count, |index| {
@@ -145,14 +145,14 @@ impl<'a> Sample<'a> {
         })
     }
 
-    /// How many draws there are.
+    /// Number of draws.
     #[allow(clippy::len_without_is_empty)] // nobody samples nothing
     pub fn len(&self) -> usize {
         self.attempts.len()
     }
 }
 
-/// The draws of a batch: the spectrum of each, and what it took.
+/// Spectra and statuses of a batch, draw by draw.
 pub(crate) fn rows<'b>(batch: &'b Batch) -> impl Iterator<Item = (&'b [f32], DrawStatus)> {
     let bands = batch.formats()[0].width;
     batch.spectra().chunks_exact(bands).zip(batch.statuses().iter().copied())

@@ -1,11 +1,11 @@
-//! A model made by hand that has what no fit gives: a mean of the weights other than zero, and a full covariance of
-//! deficient rank.
+//! A model made by hand with properties that no fit gives: a mean of the weights other than zero, and a full
+//! covariance of deficient rank.
 
 use crate::model::{Model, ModelParts};
 use nalgebra::DMatrix;
 
-/// The built-in reflectances with two of their components gone, the other four turned into all six weights, and a
-/// mean that favours one side of each.
+/// Makes the model: the built-in reflectances with two components dropped, the other four turned into all six
+/// weights, and a mean that favours one side of each.
 pub fn tinted() -> Model {
     let parts = Model::builtin("munsell-vrhel").expect("it is built in").parts().clone();
     let k = parts.basis.nrows();

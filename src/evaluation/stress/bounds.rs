@@ -31,7 +31,7 @@ pub(super) const CASES: &[Case] = &[
     case("attempts at the cap", "draws that fail within the attempts allowed", capped),
 ];
 
-/// Reflectances that vary in one band of three, by 0.1.
+/// Makes reflectances that vary in one band of three, by 0.1.
 fn one_varies(mean: f64) -> Model {
     let mut basis = nalgebra::DMatrix::zeros(1, 3);
     basis[0] = 1.0;
@@ -39,7 +39,7 @@ fn one_varies(mean: f64) -> Model {
         .expect("it is a model")
 }
 
-/// The share of draws in (0, 1) must be that of the normal distribution, to its standard error.
+/// Checks that the share of draws in (0, 1) is that of the normal distribution, to its standard error.
 fn share(engine: &Engine, mean: f64) -> Answer {
     let recipe = build(Recipe::builder(&one_varies(mean)).proposal(ProposalKind::Plain))?;
     let below = |x: f64| erfc(-x / std::f64::consts::SQRT_2) / 2.0;
@@ -58,7 +58,8 @@ fn on_bound(engine: &Engine) -> Answer {
     all([0.0, 1.0].map(|mean| (format!("mean {mean}"), share(engine, mean))))
 }
 
-/// Up to 3 deviations can be drawn. Beyond, a draw might exhaust its attempts, and the recipe must say so.
+/// Checks means outside a bound: up to 3 deviations can be drawn; beyond, a draw might exhaust its attempts, and the
+/// recipe must say so.
 fn outside(engine: &Engine) -> Answer {
     let drawn = [1.0, 2.0, 3.0].map(|d| (format!("{d}"), share(engine, -0.1 * d)));
     let hopeless = |e: &RecipeError| matches!(e, RecipeError::Hopeless { .. });
@@ -75,7 +76,7 @@ fn outside(engine: &Engine) -> Answer {
     all(drawn.into_iter().chain(covered).chain(refused))
 }
 
-/// The answer of a recipe that may be drawn to within `bound`, or be refused for want of room in f32.
+/// Checks a recipe that may be drawn to within `bound`, or be refused for want of room in f32.
 fn drawn_or_refused(engine: &Engine, builder: RecipeBuilder, bound: f64) -> Answer {
     use RecipeError::{Empty, Hopeless, Lrv, Scale, UnreachableLrv};
     match builder.clone().build() {
@@ -174,7 +175,7 @@ fn almost_white(engine: &Engine) -> Answer {
     drawn_or_refused(engine, target(&grey, 1.0 - 1e-9, Bounds::Scaled), SCALED_ERROR)
 }
 
-/// One attempt where all pass; as many as are just enough; fewer; and more than the counter holds.
+/// Checks limits on attempts: one where all pass; as many as are just enough; fewer; and more than the counter holds.
 fn capped(engine: &Engine) -> Answer {
     let model = builtin("munsell-vrhel");
     let plain = || Recipe::builder(&model);

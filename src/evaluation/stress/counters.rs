@@ -57,7 +57,7 @@ fn indices(engine: &Engine) -> Answer {
     }))
 }
 
-/// Of f32 on the CPU, to which the twins tie every adapter.
+/// Checks words of f32 on the CPU, to which the twins tie every adapter.
 fn words(_: &Engine) -> Answer {
     let ends = [0, 1, 0x7FFF_FFFF, 0x8000_0000, u32::MAX - 1, u32::MAX];
     let mut worst = 0f64;
@@ -73,7 +73,7 @@ fn words(_: &Engine) -> Answer {
     within("36 pairs, the largest 6.76 (absolute error)", worst, 2e-6)
 }
 
-/// Bit for bit the beginning of the longest.
+/// Checks that short ranges are, bit for bit, the beginning of the longest.
 fn counts(engine: &Engine) -> Answer {
     let recipe = plain()?;
     let bands = recipe.model().bands();
@@ -90,7 +90,7 @@ fn counts(engine: &Engine) -> Answer {
     good(format!("0 to {}: the same bits whatever the count", 2 * window))
 }
 
-/// The sampler as a guest on a device without any feature, and with the default limits, which every implementation has.
+/// Draws as a guest on a device without any feature, and with the default limits, which every implementation has.
 fn least_limits(engine: &Engine) -> Answer {
     let Some(wanted) = engine.adapter() else { return good("the CPU has no such limits") };
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());

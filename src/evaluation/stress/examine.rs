@@ -1,4 +1,4 @@
-//! What the cases share: models made by hand, and draws held against those in f64 of the same words.
+//! Tools that the cases share: models made by hand, and comparisons of draws with those in f64 of the same words.
 
 use std::f64::consts::PI;
 
@@ -16,27 +16,27 @@ use crate::program::Bounds;
 use crate::random::stream::{DrawRange, Stream};
 use crate::recipe::{Recipe, RecipeBuilder, RecipeError};
 
-/// Draws of a case.
+/// Number of draws per case.
 pub(super) const DRAWS: u64 = 10_000;
 
-/// The largest error of a value, in parts of the size of its recipe: some ten roundings, and normals good to 4e-7.
+/// Largest error of a value, relative to the size of its recipe: some ten roundings, and normals good to 4e-7.
 pub(super) const ERROR: f64 = 1e-6;
 
-/// The same in parts of the spectrum's peak, where there is a target LRV: the darkest candidates are scaled up tenfold
-/// and more, and their errors with them.
+/// Largest error relative to the spectrum's peak, where there is a target LRV: the darkest candidates are scaled up
+/// tenfold and more, and their errors with them.
 pub(super) const SCALED_ERROR: f64 = 1e-5;
 
-/// The most draws of a case that may take another candidate than in f64 (once in 10^6 is expected).
+/// Largest number of draws of a case that may take another candidate than in f64 (once in 10^6 is expected).
 const FLIPS: usize = 1;
 
-/// How far an estimate may be off, in standard errors: a sound one is once in 10^9 times.
+/// Number of standard errors that an estimate may be off: a sound one is once in 10^9 times.
 pub(super) const SIGMAS: f64 = 6.1;
 
 pub(super) fn builtin(name: &str) -> Model {
     Model::builtin(name).expect("it is built in")
 }
 
-/// k orthonormal rows of n values: cosines of 0, 1/2, 1, ... periods.
+/// Returns k orthonormal rows of n values: cosines of 0, 1/2, 1, ... periods.
 pub(super) fn cosines(k: usize, n: usize) -> DMatrix<f64> {
     DMatrix::from_fn(k, n, |j, b| {
         let norm = if j == 0 { 1.0 } else { 2.0 } / n as f64;
@@ -44,7 +44,7 @@ pub(super) fn cosines(k: usize, n: usize) -> DMatrix<f64> {
     })
 }
 
-/// A model of spectra around `mean` with the weights' covariance, on cosines.
+/// Makes a model of spectra around `mean` with the weights' covariance, on cosines.
 pub(super) fn model(kind: SpectrumKind, mean: Vec<f64>, covariance: DMatrix<f64>) -> Model {
     let basis = cosines(covariance.nrows(), mean.len());
     Model::new(parts(kind, mean, basis, covariance)).expect("the parts are a model")
@@ -76,7 +76,7 @@ pub(super) fn diagonal(variances: impl IntoIterator<Item = f64>) -> DMatrix<f64>
     DMatrix::from_diagonal(&DVector::from_vec(variances.into_iter().collect()))
 }
 
-/// Draws of an engine: their spectra one after another, and what each took.
+/// Draws with an engine: the spectra one after another, and the statuses.
 pub(super) fn draw(
     engine: &Engine,
     recipe: &Recipe,
@@ -97,20 +97,20 @@ pub(super) fn draw(
     }
 }
 
-/// What draws came to beside those in f64.
+/// Comparison of draws with those in f64.
 pub(super) struct Examined {
-    /// The largest error of a value, in parts of the size of the recipe, or of the spectrum's peak where there is a
+    /// Largest error of a value, relative to the size of the recipe, or to the spectrum's peak where there is a
     /// target.
     pub(super) error: f64,
-    /// The largest error of the LRV, where there is a target.
+    /// Largest error of the LRV, where there is a target.
     pub(super) lrv_error: f64,
-    /// The most candidates that a draw took.
+    /// Largest number of candidates that a draw took.
     pub(super) most_attempts: u32,
-    /// The share of candidates that were accepted.
+    /// Share of candidates that were accepted.
     pub(super) acceptance: f64,
 }
 
-/// Holds draws against those in f64. An error where one is not finite, not physical, or too many took another
+/// Compares draws with those in f64. An error where one is not finite, not physical, or too many took another
 /// candidate.
 pub(super) fn examine(engine: &Engine, recipe: &Recipe, draws: DrawRange) -> Result<Examined, String> {
     let (spectra, statuses) = draw(engine, recipe, draws)?;
@@ -156,26 +156,26 @@ pub(super) fn examine(engine: &Engine, recipe: &Recipe, draws: DrawRange) -> Res
     })
 }
 
-/// The largest term that spectra are usually made of: a band's mean, and one deviation.
+/// Typical size of the largest term of a spectrum: a band's mean, and one deviation.
 fn size(recipe: &Recipe) -> f64 {
     let program = recipe.program();
     let deviation = |b: usize| program.spectrum.gain.iter().map(|gain| gain[b] * gain[b]).sum::<f64>().sqrt();
     (0..program.bands()).map(|b| program.spectrum.offset[b].abs() + deviation(b)).fold(0.0, f64::max)
 }
 
-/// A recipe that must be one.
+/// Builds a recipe that must be accepted.
 pub(super) fn build(builder: RecipeBuilder) -> Result<Recipe, String> {
     builder.build().map_err(|e| format!("refused: {e}"))
 }
 
-/// The answer of a recipe whose draws must be those in f64 to within `bound`.
+/// Checks a recipe whose draws must be those in f64 to within `bound`.
 pub(super) fn drawn(engine: &Engine, builder: RecipeBuilder, bound: f64) -> Answer {
     let recipe = build(builder)?;
     let examined = examine(engine, &recipe, Stream::named(1, "stress").draws(0..DRAWS))?;
     within(format!("{DRAWS} draws, {}", attempts(&examined)), examined.error, bound)
 }
 
-/// What draws took, in words.
+/// Describes the candidates that draws took.
 pub(super) fn attempts(examined: &Examined) -> String {
     match examined.most_attempts {
         1 => "each at the first attempt".to_owned(),
@@ -183,7 +183,7 @@ pub(super) fn attempts(examined: &Examined) -> String {
     }
 }
 
-/// The answer of a recipe that must be refused for a reason.
+/// Checks a recipe that must be refused for a reason.
 pub(super) fn refused(builder: RecipeBuilder, reason: fn(&RecipeError) -> bool) -> Answer {
     match builder.build() {
         Err(e) if reason(&e) => super::good(format!("refused: {}", first_sentence(&e.to_string()))),
@@ -192,13 +192,12 @@ pub(super) fn refused(builder: RecipeBuilder, reason: fn(&RecipeError) -> bool) 
     }
 }
 
-/// A message up to where it begins to advise.
+/// Part of a message before its advice.
 pub(super) fn first_sentence(message: &str) -> &str {
     message.split("; ").next().unwrap_or(message)
 }
 
-/// The answers of several parts as one: their results, once where they are the same, and the error closest to its
-/// bound.
+/// Joins the answers of several parts: their results, once where they are equal, and the error closest to its bound.
 pub(super) fn all(parts: impl IntoIterator<Item = (String, Answer)>) -> Answer {
     let mut whole = super::Good::default();
     let mut results: Vec<(String, String)> = Vec::new();
@@ -218,7 +217,7 @@ pub(super) fn all(parts: impl IntoIterator<Item = (String, Answer)>) -> Answer {
     Ok(whole)
 }
 
-/// A plain recipe's bounds and target in one.
+/// Builds a recipe with bounds and a target.
 pub(super) fn target(model: &Model, lrv: f64, bounds: Bounds) -> RecipeBuilder {
     Recipe::builder(model).lrv(lrv).bounds(bounds)
 }

@@ -44,7 +44,7 @@ fn fit(kind: SpectrumKind, normalization: Normalization, spectra: &[Vec<f64>]) -
     fitted.map_err(|e| format!("the fit was refused: {e}"))
 }
 
-/// How far two models are apart, in parts of the largest entry of each part, once the second is divided by `scale`.
+/// Distance of two models, relative to the largest entry of each part, once the second is divided by `scale`.
 fn distance(a: &Model, b: &Model, scale: f64) -> f64 {
     let (a, b) = (a.parts(), b.parts());
     // A part of each deviation, since directions of small variance matter as much.
@@ -96,7 +96,7 @@ fn raw_units(engine: &Engine) -> Answer {
     all(parts)
 }
 
-/// The target holds whatever the unit of the data, or the recipe is refused.
+/// Checks that the target holds whatever the unit of the data, or that the recipe is refused.
 fn dark(engine: &Engine) -> Answer {
     let spectra = surfaces();
     let parts = [1e-30, 1e-29, 1e-28, 1e-20, 1e-10].map(|scale| {
@@ -109,7 +109,7 @@ fn dark(engine: &Engine) -> Answer {
                 };
                 let draws = crate::random::stream::Stream::named(3, "stress").draws(0..DRAWS);
                 let examined = examine(engine, &recipe, draws)?;
-                within("the LRV holds (error in parts of it)", examined.lrv_error, SCALED_ERROR)
+                within("the LRV holds (error relative to it)", examined.lrv_error, SCALED_ERROR)
             });
         (format!("{scale:e}"), answer)
     });
@@ -133,7 +133,7 @@ fn outlier(engine: &Engine) -> Answer {
     }
 }
 
-/// The fit is what it was asked for: its first component is that spectrum, and explains all to 10^-9.
+/// Checks that the first component is the outlying spectrum, and explains all to 10^-9.
 fn raw_outlier(engine: &Engine) -> Answer {
     let (_, bright) = brightened();
     let model = fit(SpectrumKind::Illuminant, Normalization::None, &bright)?;

@@ -2,7 +2,7 @@
 //! kind. None may hang, give what is not a number, or give a spectrum that is not physical.
 //!
 //! Tests demand every answer, and the report shows them for its user's adapter. Values are judged against the draw in
-//! f64 from the same words, in parts of the largest terms that they are made of, because that is what f32 rounds.
+//! f64 from the same words, relative to the largest terms that they are made of, because that is what f32 rounds.
 
 mod bounds;
 mod counters;
@@ -19,41 +19,41 @@ use crate::engine::Engine;
 /// A case, to be run on an engine.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
-    /// What is stiff or extreme.
+    /// Description of what is stiff or extreme.
     pub name: &'static str,
-    /// What could break.
+    /// Description of what could break.
     pub could_break: &'static str,
     run: fn(&Engine) -> Answer,
 }
 
-/// What a case came to, or what is wrong with it.
+/// Answer of a case, or a description of what is wrong.
 type Answer = Result<Good, String>;
 
 /// A right answer.
 #[derive(Debug, Default)]
 struct Good {
     result: String,
-    /// The largest error found, and what it may be.
+    /// The largest error found, and its bound.
     error: Option<(f64, f64)>,
 }
 
-/// What came of a case.
+/// Outcome of a case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
-    /// What is stiff or extreme.
+    /// Description of what is stiff or extreme.
     pub name: &'static str,
-    /// What could break.
+    /// Description of what could break.
     pub could_break: &'static str,
     /// Whether the answer is the right one.
     pub passed: bool,
     /// The answer in words.
     pub result: String,
-    /// The largest error found, where there are values: in parts of the largest mean and deviation of a band, or of the
-    /// spectrum's peak where there is a target LRV, unless `result` says of what.
+    /// The largest error found, where there are values: relative to the largest mean and deviation of a band, or to
+    /// the spectrum's peak where there is a target LRV, unless `result` says otherwise.
     pub error: Option<f64>,
-    /// What the error may be.
+    /// Bound on the error.
     pub bound: Option<f64>,
-    /// How long it took, seconds.
+    /// Duration, seconds.
     pub seconds: f64,
 }
 

@@ -26,19 +26,19 @@ pub(super) const CASES: &[Case] = &[
     case("1,000 bands", "long shaders; the form with loops", thousand_bands),
 ];
 
-/// A rotation of k dimensions without any special direction.
+/// Returns a rotation of k dimensions without any special direction.
 fn rotation(k: usize) -> DMatrix<f64> {
     DMatrix::from_fn(k, k, |i, j| ((7 * i + 3 * j * j + 1) as f64).sin()).qr().q()
 }
 
-/// Reflectances around 1/2 whose covariance has these variances along no axis.
+/// Makes reflectances around 1/2 whose covariance has these variances along no axis.
 fn turned(variances: &[f64]) -> Model {
     let turn = rotation(variances.len());
     let covariance = &turn * diagonal(variances.iter().copied()) * turn.transpose();
     model(SpectrumKind::Reflectance, vec![0.5; 31], (&covariance + covariance.transpose()) / 2.0)
 }
 
-/// Along each principal direction: the factor's variance to 1e-3, and that of draws in f64 to its standard error.
+/// Checks each principal direction: the factor's variance to 1e-3, and that of draws in f64 to its standard error.
 fn stiff(engine: &Engine) -> Answer {
     all([0, 4, 8, 12].map(|power| {
         let variances: [f64; 6] =
@@ -56,7 +56,7 @@ fn stiff(engine: &Engine) -> Answer {
     }))
 }
 
-/// Whether draws in f64 have these variances along the columns of `turn`.
+/// Checks that draws in f64 have these variances along the columns of `turn`.
 fn directions(model: &Model, turn: &DMatrix<f64>, variances: &[f64]) -> Result<(), String> {
     let oracle = build(Recipe::builder(model))?.scalar_sampler::<f64>();
     let weights: Vec<_> = (0..DRAWS)
@@ -127,7 +127,8 @@ fn indefinite(_: &Engine) -> Answer {
     }
 }
 
-/// The two offsets are added in f64, before anything is rounded: the bound is that of their rounding errors there.
+/// Checks offsets that cancel: they are added in f64, before anything is rounded, so the bound is that of their
+/// rounding errors there.
 fn cancelling(engine: &Engine) -> Answer {
     let mut parts =
         parts(SpectrumKind::Reflectance, vec![1e6 + 0.5; 31], cosines(3, 31), diagonal([0.01, 0.004, 0.001]));
@@ -136,7 +137,7 @@ fn cancelling(engine: &Engine) -> Answer {
     drawn(engine, Recipe::builder(&model), ERROR)
 }
 
-/// A sum of 64 terms rounds more often than one of 6.
+/// Checks many components: a sum of 64 terms rounds more often than one of 6.
 fn components(engine: &Engine) -> Answer {
     all([(1, 31), (2, 31), (31, 31), (64, 64)].map(|(k, bands)| {
         let covariance = diagonal((0..k).map(|j| 0.02 / (1.0 + j as f64).powi(2)));

@@ -11,7 +11,7 @@ use crate::output::Encoder;
 use crate::output::h5::{self, io_error};
 use crate::quantity::Dtype;
 
-/// What comes before HDF5: 116 characters of text, and a version.
+/// Bytes before the HDF5 part: 116 characters of text, and a version.
 const USERBLOCK: u64 = 512;
 
 pub(super) struct Mat {
@@ -77,7 +77,7 @@ fn class(set: &H5Dataset, name: &str) -> Result<(), Hdf5Error> {
     h5::text_attribute(set, "MATLAB_class", name)
 }
 
-/// A small matrix of doubles. HDF5's first dimension is MATLAB's last.
+/// Writes a small matrix of doubles. HDF5's first dimension is MATLAB's last.
 fn row(file: &H5File, name: &str, values: &[f64], shape: &[usize]) -> Result<(), Hdf5Error> {
     let set = file.new_dataset::<f64>().shape(shape).create(name)?;
     set.write_raw(values)?;

@@ -1,4 +1,4 @@
-//! Whether a set is still what was written.
+//! Verification that a set is still as it was written.
 
 use std::path::{Path, PathBuf};
 
@@ -21,28 +21,28 @@ impl SetAudit {
         Ok(SetAudit { root: path.to_owned(), manifest })
     }
 
-    /// What the set is.
+    /// Plan of the set.
     pub fn plan(&self) -> &SetPlan {
         &self.manifest.plan
     }
 
-    /// What drew it.
+    /// Engines that drew it.
     pub fn engines(&self) -> impl Iterator<Item = &str> {
         self.manifest.engines.iter().map(String::as_str)
     }
 
-    /// The chunks that are done.
+    /// Indices of the chunks that are done.
     pub fn chunks(&self) -> Vec<u64> {
         self.manifest.chunks.keys().copied().collect()
     }
 
-    /// How the files of a chunk differ from what was written, if they do.
+    /// Describes how the files of a chunk differ from what was written, if they do.
     pub fn fault(&self, chunk: u64) -> Option<String> {
         self.manifest.chunks[&chunk].iter().find_map(|sum| sum.fault(&self.root))
     }
 
-    /// How what all draws share, drawn again as `constants`, differs from what was written, if it does: no manifest
-    /// has its sums.
+    /// Describes how the arrays that all draws share, drawn again as `constants`, differ from what was written, if
+    /// they do: no manifest has their sums.
     pub fn shared_difference(&self, constants: Vec<SharedArray>) -> Result<Option<String>, OutputError> {
         let mut plan = self.manifest.plan.clone();
         plan.schema.shared = constants;
@@ -53,7 +53,7 @@ impl SetAudit {
         Ok(parts.iter().find(differs).map(|part| format!("{} is not what is drawn now", part.name)))
     }
 
-    /// How a chunk that was drawn again differs from what was written, if it does. `columns` are its draws.
+    /// Describes how a chunk that was drawn again differs from what was written, if it does. `columns` are its draws.
     pub fn difference(&self, chunk: u64, columns: &[Vec<u8>]) -> Result<Option<String>, OutputError> {
         let plan = &self.manifest.plan;
         let failed = |source| OutputError::Write { path: self.root.clone(), source };

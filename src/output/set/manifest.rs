@@ -1,4 +1,4 @@
-//! What a set says of itself: a plan, which is all that its bytes depend on, and the sums of the chunks that are done.
+//! Manifest of a set: its plan, on which all its bytes depend, and the sums of the chunks that are done.
 //!
 //! While a set is being written each process keeps a manifest of its own, so that any number of them can work on one
 //! set without a coordinator. Sealing joins them into one.
@@ -16,44 +16,44 @@ use super::super::pending::ignore_missing;
 use super::super::{OutputError, Schema};
 use super::{ChunkFormat, Part};
 
-/// The manifest of a whole set.
+/// Name of the manifest of a whole set.
 pub(super) const SEALED: &str = "_manifest.json";
 
-/// The version of the manifest that this program writes and reads.
+/// Version of the manifest that this program writes and reads.
 const VERSION: u32 = 1;
 
-/// What a set is: all that its bytes depend on.
+/// Plan of a set: everything that its bytes depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetPlan {
-    /// How its chunks are stored.
+    /// Format of its chunks.
     pub layout: ChunkFormat,
-    /// How many draws a chunk has; the last may have fewer.
+    /// Number of draws per chunk; the last may have fewer.
     pub chunk: u64,
-    /// What it holds.
+    /// Schema of its rows.
     #[serde(flatten)]
     pub schema: Schema,
 }
 
 impl SetPlan {
-    /// How many chunks there are.
+    /// Number of chunks.
     pub fn chunks(&self) -> u64 {
         self.schema.count.div_ceil(self.chunk)
     }
 
-    /// The draws of a chunk, counted from the set's first.
+    /// Range of draws in a chunk, counted from the set's first.
     pub fn draws(&self, chunk: u64) -> Range<u64> {
         let first = chunk * self.chunk;
         first..self.schema.count.min(first + self.chunk)
     }
 
-    /// Where another plan differs, with the value here and the value there.
+    /// Describes the first setting in which another plan differs, with the value here and the value there.
     fn difference(&self, other: &SetPlan) -> Option<String> {
         let json = |plan| serde_json::to_value(plan).expect("plans are JSON");
         difference("", &json(self), &json(other))
     }
 }
 
-/// The first difference of two values, innermost.
+/// Describes the first difference of two values, innermost.
 fn difference(place: &str, here: &Value, there: &Value) -> Option<String> {
     let inner = |name: &str| if place.is_empty() { name.to_owned() } else { format!("{place}.{name}") };
     match (here, there) {
@@ -68,7 +68,7 @@ fn difference(place: &str, here: &Value, there: &Value) -> Option<String> {
     }
 }
 
-/// A file of a chunk, as it was written.
+/// Sum of a file of a chunk, as it was written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Sum {
     pub(super) name: String,
@@ -82,7 +82,7 @@ impl Sum {
         Sum { name: part.name.clone(), bytes: part.bytes.len() as u64, blake3 }
     }
 
-    /// How the file in a set differs from what was written, if it does.
+    /// Describes how the file in a set differs from what was written, if it does.
     pub(super) fn fault(&self, root: &Path) -> Option<String> {
         let bytes = match fs::read(root.join(&self.name)) {
             Ok(bytes) => bytes,
@@ -99,15 +99,15 @@ impl Sum {
     }
 }
 
-/// The manifest of a set, or of what one process has done of it.
+/// Manifest of a set, or of the part of it that one process has done.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Manifest {
-    /// Its version.
+    /// Version of the manifest.
     manifest: u32,
     pub(super) plan: SetPlan,
-    /// What drew.
+    /// Engines that drew the chunks.
     pub(super) engines: BTreeSet<String>,
-    /// The files of each chunk that is done.
+    /// Files of each chunk that is done.
     pub(super) chunks: BTreeMap<u64, Vec<Sum>>,
 }
 
@@ -120,7 +120,7 @@ impl Manifest {
         self.chunks.len() as u64 == self.plan.chunks()
     }
 
-    /// An error where a plan is not that of this manifest, which lies in the folder `root`.
+    /// Returns an error where a plan is not that of this manifest, which lies in the folder `root`.
     pub(super) fn check(&self, plan: &SetPlan, root: &Path) -> Result<(), OutputError> {
         match plan.difference(&self.plan) {
             Some(difference) => Err(OutputError::Different { path: root.to_owned(), difference }),
@@ -128,17 +128,17 @@ impl Manifest {
         }
     }
 
-    /// The text of its file.
+    /// Text of the manifest's file.
     pub(super) fn text(&self) -> String {
         serde_json::to_string_pretty(self).expect("manifests are JSON") + "\n"
     }
 
-    /// The manifest of a whole set.
+    /// Reads the manifest of a whole set.
     pub(super) fn sealed(root: &Path) -> Result<Manifest, OutputError> {
         read(&root.join(SEALED))?.ok_or_else(|| OutputError::NotASet { path: root.to_owned() })
     }
 
-    /// All that is known of a set that is not sealed; `None` where nothing is.
+    /// Joins the manifests of a set that is not sealed; `None` where there are none.
     pub(super) fn joined(root: &Path) -> Result<Option<Manifest>, OutputError> {
         let failed = |source| OutputError::Read { path: root.to_owned(), source };
         let mut joined: Option<Manifest> = None;
@@ -157,12 +157,12 @@ impl Manifest {
     }
 }
 
-/// The name of the manifest of one of several processes, both counted from 1.
+/// Name of the manifest of one of several processes, both counted from 1.
 pub(super) fn part_name(index: u64, count: u64) -> String {
     format!("_manifest.{index}-of-{count}.json")
 }
 
-/// The manifests in a folder, of processes and of the whole.
+/// Lists the manifests in a folder, of processes and of the whole.
 pub(super) fn manifests(root: &Path) -> io::Result<Vec<std::path::PathBuf>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(root)? {
@@ -182,7 +182,7 @@ pub(super) fn remove_parts(root: &Path) -> io::Result<()> {
     parts.into_iter().try_for_each(|path| fs::remove_file(path).or_else(ignore_missing))
 }
 
-/// A manifest, if it is there.
+/// Reads a manifest, if it exists.
 fn read(path: &Path) -> Result<Option<Manifest>, OutputError> {
     let failed = |reason: String| OutputError::Manifest { path: path.to_owned(), reason };
     let text = match fs::read_to_string(path) {

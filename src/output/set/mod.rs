@@ -1,4 +1,4 @@
-//! Data sets of many files: chunks of draws, each written once and whole, and a manifest of their sums.
+//! Data sets of many files: chunks of draws, each written once and whole, and a manifest of their BLAKE3 sums.
 //!
 //! A set is written in a folder beside its name, `NAME.partial`, and renamed when every chunk is there. A run that is
 //! killed leaves the chunks that it finished, and the next goes on from them. Processes that share a set divide its
@@ -31,20 +31,20 @@ use manifest::{Manifest, part_name};
 use pool::{Chunk, Pool};
 pub use seal::{SetStatus, merge};
 
-/// About how many bytes a chunk has unless asked otherwise: large enough for a disk, small enough to hold several.
+/// Approximate default size of a chunk in bytes: large enough for a disk, small enough to hold several.
 const CHUNK_BYTES: u64 = 16 << 20;
 
-/// How often the manifest is brought up to date, at most: what a killed run does again. Never so often that it takes
-/// more than a twentieth of the time.
+/// Shortest time between saves of the manifest: a killed run repeats no more than this. Saves take at most a
+/// twentieth of the time.
 const CHECKPOINT: Duration = Duration::from_millis(100);
 
-/// How chunks are stored.
+/// Format of a set's chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ChunkFormat {
-    /// A Zarr store, version 3, packed by Zstandard at a level if that is given.
+    /// A Zarr store, version 3, compressed by Zstandard where a level is given.
     Zarr {
-        /// The level of Zstandard.
+        /// Zstandard level.
         zstd: Option<i32>,
     },
     /// A folder of `.npy` files.
@@ -55,18 +55,18 @@ pub enum ChunkFormat {
 
 /// A file of a set.
 pub(super) struct Part<'a> {
-    /// Its path in the set's folder.
+    /// Path in the set's folder.
     pub(super) name: String,
     pub(super) bytes: Cow<'a, [u8]>,
 }
 
 impl ChunkFormat {
-    /// How many of `count` draws of such rows a chunk has, unless asked otherwise: a power of two, or all.
+    /// Default number of draws per chunk, for rows of `row_bytes` and `count` draws in all: a power of two, or all.
     pub fn default_chunk(row_bytes: u64, count: u64) -> u64 {
         (1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2()).min(count.max(1))
     }
 
-    /// The files of a chunk.
+    /// Encodes the files of a chunk.
     fn encode<'a>(self, plan: &SetPlan, index: u64, columns: &'a [Vec<u8>]) -> io::Result<Vec<Part<'a>>> {
         match self {
             ChunkFormat::Zarr { zstd } => zarr::chunk(&plan.schema, zstd, plan.chunk, index, columns),
@@ -75,7 +75,7 @@ impl ChunkFormat {
         }
     }
 
-    /// The files that tell what the chunks are.
+    /// Encodes the files that describe the chunks to readers.
     fn metadata(self, plan: &SetPlan) -> io::Result<Vec<Part<'static>>> {
         match self {
             ChunkFormat::Zarr { zstd } => Ok(zarr::metadata(&plan.schema, zstd, plan.chunk)),
@@ -84,7 +84,7 @@ impl ChunkFormat {
         }
     }
 
-    /// The files of what all draws share.
+    /// Encodes the files of the arrays that all draws share.
     fn constants(self, plan: &SetPlan) -> io::Result<Vec<Part<'_>>> {
         match self {
             ChunkFormat::Zarr { .. } => Ok(zarr::constants(&plan.schema)),
@@ -93,7 +93,7 @@ impl ChunkFormat {
         }
     }
 
-    /// The folders in a set.
+    /// Folders within a set.
     fn folders(self, plan: &SetPlan) -> Vec<String> {
         match self {
             ChunkFormat::Zarr { .. } => {
@@ -106,27 +106,27 @@ impl ChunkFormat {
     }
 }
 
-/// Which part of the chunks one of several processes makes: the `index`-th of `count`, from 1.
+/// Part of a set's chunks that one of several processes writes: the `index`-th of `count`, from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which, from 1.
+    /// Number of the part, from 1.
     pub index: u64,
-    /// Of how many.
+    /// Number of parts.
     pub count: u64,
 }
 
 impl Shard {
-    /// All of them.
+    /// The whole set.
     pub const WHOLE: Shard = Shard { index: 1, count: 1 };
 
-    /// Its chunks: shards differ by one chunk at most.
+    /// Chunks of the part; parts differ by one chunk at most.
     pub fn of(self, chunks: u64) -> Range<u64> {
         let bound = |i: u64| (u128::from(i) * u128::from(chunks) / u128::from(self.count)) as u64;
         bound(self.index - 1)..bound(self.index)
     }
 }
 
-/// What to do with what is there already.
+/// Treatment of a set that exists already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetMode {
     /// Refuse to touch it.
@@ -137,34 +137,34 @@ pub enum SetMode {
     Resume,
 }
 
-/// The number of chunks that are done, and of all.
+/// Number of chunks that are done, and of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// The number of chunks that are done.
+    /// Number of chunks that are done.
     pub done: u64,
-    /// The number of all chunks.
+    /// Number of all chunks.
     pub chunks: u64,
 }
 
-/// A set that is being written.
+/// Writer of a set.
 pub struct SetWriter {
     path: PathBuf,
-    /// Where its chunks are until it is sealed.
+    /// Folder of its chunks until it is sealed.
     root: PathBuf,
     plan: Arc<SetPlan>,
     shard: Shard,
     start: SetMode,
-    /// What this process has done or found done.
+    /// Manifest of the chunks that this process has done or found done.
     manifest: Manifest,
-    /// The chunks to be drawn, in order.
+    /// Chunks to be drawn, in order.
     missing: std::collections::VecDeque<u64>,
-    /// The columns of the first of them, as far as they came.
+    /// Columns of the first missing chunk, as far as they were delivered.
     filling: Vec<Vec<u8>>,
     pool: Pool,
     spare: Vec<Vec<Vec<u8>>>,
-    /// When the manifest may be brought up to date again.
+    /// Earliest time of the manifest's next save.
     checkpoint: Instant,
-    /// Chunks that it does not have.
+    /// Number of chunks that the saved manifest lacks.
     unsaved: usize,
 }
 
@@ -228,7 +228,7 @@ impl SetWriter {
         Ok(writer)
     }
 
-    /// The draws that are to be written, in order, counted from the set's first.
+    /// Ranges of the draws that are to be written, in order, counted from the set's first.
     pub fn missing(&self) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
         for draws in self.missing.iter().map(|&chunk| self.plan.draws(chunk)) {
@@ -240,18 +240,18 @@ impl SetWriter {
         ranges
     }
 
-    /// The chunks of this process's part, and those of them that are done.
+    /// Progress of this process's part.
     pub fn progress(&self) -> Progress {
         let own = self.shard.of(self.plan.chunks());
         Progress { done: self.manifest.chunks.len() as u64, chunks: own.end - own.start }
     }
 
-    /// Where the chunks are until the set is complete.
+    /// Folder of the chunks until the set is complete.
     pub fn folder(&self) -> &Path {
         &self.root
     }
 
-    /// Takes the next draws of [`SetWriter::missing`], a column for each field.
+    /// Writes the next draws of [`SetWriter::missing`], a column for each field.
     pub fn write(&mut self, columns: &[&[u8]]) -> Result<(), OutputError> {
         let rows = self.plan.schema.rows(columns) as u64;
         let mut done = 0;
@@ -291,7 +291,7 @@ impl SetWriter {
         if self.unsaved > 0 && Instant::now() > self.checkpoint { self.save() } else { Ok(()) }
     }
 
-    /// Brings this process's manifest up to date.
+    /// Saves this process's manifest.
     fn save(&mut self) -> Result<(), OutputError> {
         let name = part_name(self.shard.index, self.shard.count);
         let start = Instant::now();

@@ -1,4 +1,4 @@
-//! A folder of small files: each chunk of draws is one of its own, in `.npy` (one for each quantity) or `.parquet`.
+//! Sets as folders of small files: each chunk of draws has its own, in `.npy` (one per quantity) or `.parquet`.
 
 use std::io;
 
@@ -6,7 +6,7 @@ use super::super::npy;
 use super::super::schema::{Schema, SharedArray};
 use super::Part;
 
-/// The `.npy` files of one chunk.
+/// Encodes the `.npy` files of one chunk.
 pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Result<Vec<Part<'static>>> {
     schema
         .fields
@@ -20,14 +20,14 @@ pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Resul
         .collect()
 }
 
-/// What the `.npy` files leave unsaid.
+/// Encodes the wavelengths, which the `.npy` files of the chunks do not hold.
 pub(super) fn npy_metadata(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
     let bytes: Vec<u8> = schema.wavelengths.iter().flat_map(|w| w.to_le_bytes()).collect();
     let bytes = npy::file("<f8", &[schema.wavelengths.len() as u64], &bytes)?;
     Ok(vec![Part { name: "wavelength.npy".to_owned(), bytes: bytes.into() }])
 }
 
-/// The `.npy` files of what all draws share.
+/// Encodes the `.npy` files of the arrays that all draws share.
 pub(super) fn npy_constants(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
     let part = |constant: &SharedArray| {
         let bytes = npy::file(npy::type_string(constant.dtype), &constant.shape(), &constant.bytes)?;
@@ -36,7 +36,7 @@ pub(super) fn npy_constants(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
     schema.shared.iter().map(part).collect()
 }
 
-/// The `.parquet` file of one chunk.
+/// Encodes the `.parquet` file of one chunk.
 #[cfg(feature = "parquet")]
 pub(super) fn parquet(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Result<Vec<Part<'static>>> {
     use crate::output::Encoder;

@@ -1,4 +1,4 @@
-//! Threads that encode, hash and write chunks while the next are being drawn.
+//! Threads that encode, hash and write chunks while the next ones are drawn.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use super::super::pending::place;
 use super::SetPlan;
 use super::manifest::Sum;
 
-/// How many there are: one can hash while the other waits for the disk.
+/// Number of threads: one can hash while the other waits for the disk.
 const THREADS: usize = 2;
 
 /// A chunk of columns as they were delivered.
@@ -20,7 +20,7 @@ pub(super) struct Chunk {
     pub(super) columns: Vec<Vec<u8>>,
 }
 
-/// What became of a chunk. Its columns come back, whose memory the next chunk uses.
+/// Result of writing a chunk. Its columns come back, for the next chunk to reuse their memory.
 pub(super) struct Done {
     pub(super) chunk: Chunk,
     pub(super) written: io::Result<Vec<Sum>>,
@@ -30,12 +30,12 @@ pub(super) struct Pool {
     queue: Option<SyncSender<Chunk>>,
     pub(super) done: Receiver<Done>,
     threads: Vec<JoinHandle<()>>,
-    /// Whether chunks that wait are to be left.
+    /// Set once waiting chunks are to be dropped.
     stopped: Arc<AtomicBool>,
 }
 
 impl Pool {
-    /// Threads that write the chunks of a set in the folder `root`.
+    /// Starts threads that write the chunks of a set in the folder `root`.
     pub(super) fn new(plan: &Arc<SetPlan>, root: &Path) -> Pool {
         // One waits: with one being filled and one a thread, that bounds the memory to four.
         let (queue, chunks) = sync_channel(1);
@@ -55,19 +55,19 @@ impl Pool {
         Pool { queue: Some(queue), done, threads: threads.collect(), stopped }
     }
 
-    /// Hands over a chunk; waits where others wait already.
+    /// Hands over a chunk; waits where others are waiting already.
     pub(super) fn submit(&self, chunk: Chunk) {
         let queue = self.queue.as_ref().expect("the pool is not being closed");
         queue.send(chunk).expect("the threads wait for chunks until the queue is closed");
     }
 
-    /// Waits for the chunks that are being written, and leaves those that wait.
+    /// Waits for the chunks that are being written, and drops those that wait.
     pub(super) fn stop(&mut self) {
         self.stopped.store(true, Ordering::Relaxed);
         self.close();
     }
 
-    /// Waits for the chunks that were submitted.
+    /// Waits for all submitted chunks.
     pub(super) fn close(&mut self) {
         self.queue = None;
         self.threads.drain(..).for_each(|thread| thread.join().expect("writing does not panic"));

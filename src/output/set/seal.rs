@@ -1,4 +1,4 @@
-//! The folder of a set: how it begins, and how it comes to its name.
+//! Folder of a set: its creation, and its renaming once complete.
 
 use std::fs;
 use std::io;
@@ -9,22 +9,22 @@ use super::super::{OutputError, partial};
 use super::manifest::{Manifest, SEALED, manifests, part_name, remove_parts};
 use super::{SetMode, SetPlan, Shard};
 
-/// What a run left.
+/// Status of a set after a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetStatus {
     /// The set is complete, under its name.
     Sealed,
     /// Other processes have chunks to finish.
     Waiting {
-        /// How many chunks are done.
+        /// Number of chunks done.
         done: u64,
-        /// Of how many.
+        /// Number of all chunks.
         chunks: u64,
     },
 }
 
-/// Sees to it that the set's folder is there, and that it may be written to. Returns where its chunks are: in `path`
-/// itself where a complete set is resumed.
+/// Creates the set's folder where needed, and checks that it may be written to. Returns the folder of its chunks:
+/// `path` itself where a complete set is resumed.
 pub(super) fn occupy(
     path: &Path,
     plan: &SetPlan,
@@ -69,8 +69,8 @@ pub(super) fn occupy(
     Ok(root)
 }
 
-/// Claims a shard of a set that begins, which one process can: of two that start at once, neither sees a manifest of
-/// the other. The name is one that sealing sweeps.
+/// Claims a shard of a new set, which only one process can: of two that start at once, neither sees a manifest of the
+/// other. The name is one that sealing sweeps.
 pub(super) fn claim(path: &Path, root: &Path, shard: Shard, start: SetMode) -> Result<(), OutputError> {
     let name = format!("{PREFIX}{}{SUFFIX}", part_name(shard.index, shard.count));
     match fs::File::create_new(root.join(name)) {
@@ -85,7 +85,7 @@ pub(super) fn claim(path: &Path, root: &Path, shard: Shard, start: SetMode) -> R
     }
 }
 
-/// Seals a set of which other processes have made the chunks.
+/// Seals a set whose chunks other processes have written.
 pub fn merge(path: &Path) -> Result<(), OutputError> {
     let path = PathBuf::from_iter(path.components());
     let path = match path.to_string_lossy().strip_suffix(".partial") {

@@ -1,4 +1,4 @@
-//! Zarr version 3: a group of arrays, chunked by draws, a file a chunk.
+//! Zarr version 3: a group of arrays, chunked by draws, a file per chunk.
 //!
 //! A chunk is the bytes of its draws, and all else is JSON, so this is written out here: the `zarrs` crate would bring
 //! 139 others, and would not let a chunk be hashed and put in place whole. Dimension names and the coordinates of
@@ -12,10 +12,11 @@ use serde_json::{Map, Value, json};
 use super::super::schema::{Field, Schema, SharedArray};
 use super::Part;
 
-/// The level at which Zstandard packs chunks, where it does.
+/// Level at which Zstandard compresses chunks; `None` where it does not.
 pub(super) type Level = Option<i32>;
 
-/// The chunk files of the draws of one chunk. The last chunk of an array is as long as the others: zeros follow.
+/// Encodes the chunk files for the draws of one chunk. The last chunk of an array is padded with zeros to the length
+/// of the others.
 pub(super) fn chunk<'a>(
     schema: &Schema,
     level: Level,
@@ -54,7 +55,7 @@ fn pack(bytes: Cow<[u8]>, level: Level) -> io::Result<Cow<[u8]>> {
     Ok(bytes)
 }
 
-/// The files that tell readers what the chunks are, the one that makes it a data set last.
+/// Encodes the files that describe the chunks to readers; the one that makes them a data set is last.
 pub(super) fn metadata(schema: &Schema, level: Level, rows: u64) -> Vec<Part<'static>> {
     let mut arrays: Map<String, Value> = schema
         .fields
@@ -86,7 +87,7 @@ pub(super) fn metadata(schema: &Schema, level: Level, rows: u64) -> Vec<Part<'st
     parts
 }
 
-/// The chunks of what all draws share, one each.
+/// Encodes the arrays that all draws share, one chunk each.
 pub(super) fn constants(schema: &Schema) -> Vec<Part<'_>> {
     let name = |constant: &'_ SharedArray| {
         let others = ".0".repeat(constant.axes.len() - 1);
