@@ -179,6 +179,8 @@ fn spd_folders_are_named_as_the_authors_named_theirs() {
     assert_eq!(files(&folder.join("light")), ["illuminance_1000.spd", "illuminance_999.spd"]);
     succeeds(folder, "sample munsell-vrhel -n 1 --lrv 0.4 --format spd -o target/");
     assert_eq!(files(&folder.join("target")), ["luminance-0.4000-reflectance-001.spd"]);
+    succeeds(folder, "sample munsell-vrhel -n 2 --lrv 0.2..0.6 --format spd -o each/");
+    assert_eq!(files(&folder.join("each")), ["reflectance_001.spd", "reflectance_002.spd"]);
     fails(folder, "sample granada -n 10001 --format spd -o many/", 1, "pass --force");
     fails(folder, "sample granada -n 1 --format spd -o light/", 1, "exists already");
 }

@@ -154,7 +154,8 @@ fn a_target_moves_no_candidate() {
 fn the_acceptance_is_that_of_draws() {
     for bounds in ALL_BOUNDS {
         let recipe = recipe(bounds);
-        let attempts = draws(&recipe, Stream::new(55)).iter().map(|d| u64::from(d.status().attempts()));
+        let drawn = draws(&recipe, Stream::new(55));
+        let attempts = drawn.iter().map(|draw| u64::from(draw.status().attempts()));
         let found = COUNT as f64 / attempts.sum::<u64>() as f64;
         println!("{bounds:?}: {found:.4}, estimated {:.4}", recipe.acceptance());
         assert!((recipe.acceptance() / found - 1.0).abs() < 0.05, "{bounds:?}");
