@@ -225,7 +225,8 @@ fn scenes_are_drawn_planned_and_pictured() {
     let (json, _) = succeeds(folder.path(), "scene mine.toml --scenes 0..5 -o b.npz --json --engine cpu");
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!((json["draws"].as_u64(), json["shaders"].as_u64()), (Some(5 * 4 + 999), Some(0)));
-    succeeds(folder.path(), "scene mine.toml --preview a.png --engine cpu");
+    let (_, told) = succeeds(folder.path(), "scene mine.toml --preview a.png --engine cpu");
+    assert!(told.contains("wrote a.png"), "{told}");
     succeeds(folder.path(), "scene mine.toml --preview a.png --force --engine cpu");
     for (arguments, code, message) in [
         ("mine.toml", 2, "say where to with -o"),
@@ -247,7 +248,7 @@ fn scenes_are_drawn_planned_and_pictured() {
         ("mine.toml --preview new.png -o x.xlsx", 2, "name it .npy"),
         ("mine.toml --preview new.png -o a.npz", 1, "exists already"),
         ("mine.toml --preview new.png -o no/such.npz", 1, "create it first"),
-        ("mine.toml --preview new.jpg -o x.npz", 2, ".svg or a .png"),
+        ("mine.toml --preview new.jpg -o x.npz", 2, "a .png or a .pdf"),
         ("mine.toml --preview a.png -o x.npz", 1, "exists already"),
     ] {
         fails(folder.path(), &format!("scene {arguments}"), code, message);

@@ -21,9 +21,12 @@ pub(crate) struct Arguments {
     #[arg(value_name = "MODEL")]
     pub(crate) model: String,
 
-    /// Draw the model into this file, .svg or .png
+    /// Draw the model into this file, .svg, .png or .pdf
     #[arg(short, long, value_name = "PATH")]
     pub(crate) output: Option<PathBuf>,
+
+    #[command(flatten)]
+    ground: picture::Ground,
 
     #[command(flatten)]
     request: RecipeArguments,
@@ -43,8 +46,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = super::model(&arguments.model)?;
     let recipe = arguments.request.recipe(&model);
     if let (Some(path), Some(format)) = (&arguments.output, format) {
-        let figure =
-            picture::model::Picture { model: &model, recipe: recipe.as_ref().ok(), seed: arguments.seed };
+        let figure = picture::model::Picture {
+            name: &arguments.model,
+            model: &model,
+            recipe: recipe.as_ref().ok(),
+            seed: arguments.seed,
+            theme: arguments.ground.theme(),
+        };
         picture::write(&figure.drawing(), path, format, if_exists(arguments.force))?;
     }
     let table = table(&arguments.model, &model, &recipe);

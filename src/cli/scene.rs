@@ -48,9 +48,11 @@ pub(crate) struct Arguments {
     scenes: Option<Range<u64>>,
     #[command(flatten)]
     output: OutputArguments,
-    /// Draw a picture of some scenes, .png or .svg
+    /// Draw a picture of some scenes, .png, .svg or .pdf
     #[arg(long, value_name = "OUT.png")]
     preview: Option<PathBuf>,
+    #[command(flatten)]
+    ground: picture::Ground,
     #[command(flatten)]
     engine: EngineArguments,
     /// Say what would be drawn and what not, and draw nothing
@@ -185,7 +187,8 @@ struct Picture<'a> {
 impl Picture<'_> {
     fn make(&self, job: &Job<'_>, engine: &Engine) -> anyhow::Result<()> {
         let existing = job.arguments.output.if_exists();
-        let drawing = Preview::new(job.scene, engine, &job.scenes)?.drawing();
+        let theme = job.arguments.ground.theme();
+        let drawing = Preview::new(job.name, job.scene, engine, &job.scenes, theme)?.drawing();
         picture::write(&drawing, self.path, self.format, existing)
     }
 }

@@ -5,21 +5,19 @@
 
 use std::sync::Arc;
 
+use clap::ValueEnum as _;
 use kuva::prelude::{
-    BandPlot, Figure, Layout, LinePlot, Plot, ReferenceLine, ScatterPlot, ShadedRegion, TextAnnotation,
-    TickFormat,
+    BandPlot, Figure, Layout, LinePlot, Plot, ReferenceLine, ScatterPlot, TextAnnotation, TickFormat,
 };
 use kuva::render::render::{Primitive, Scene, TextAnchor};
-use spectroll::evaluation::plot::{self, COLOURS, DARK, Heading, LABEL_SIZE, QUIET};
-use spectroll::{Grid, Model, Recipe, SpectrumKind, Stream, colorimetry};
+use spectroll::evaluation::plot::{self, Caption, Place, TICK_SIZE, Theme};
+use spectroll::{Grid, Intensity, Model, Recipe, RecipeSettings, SpectrumKind, Stream, colorimetry};
 
 /// The size of a panel; two by two make a picture.
-const PANEL: (f64, f64) = (480.0, 350.0);
+const PANEL: (f64, f64) = (430.0, 330.0);
 
-/// Margins of a panel for text on its left, right, top and bottom: the same for all, so that their axes align.
-const MARGINS: [f64; 4] = [50.0, 16.0, 62.0, 46.0];
-
-const HEADING: Heading = Heading { title_size: 16, x: 10.0, title: 24.0, label: 45.0 };
+/// What a panel leaves for text on its left, right, top and bottom: the same for all, so that their axes align.
+const MARGINS: [f64; 4] = [70.0, 14.0, 52.0, 48.0];
 
 /// Between panels and around them.
 const GAP: f64 = 14.0;
@@ -28,50 +26,65 @@ const GAP: f64 = 14.0;
 const DRAWS: u64 = 200;
 
 /// The most basis vectors that are shown: beyond these they hide each other.
-const MAX_SHOWN: usize = COLOURS.len();
+const MAX_SHOWN: usize = 8;
 
-/// The most components whose cumulated variance is written beside its point.
+/// The most components whose remaining variance is written beside its point.
 const MAX_LABELLED: usize = 8;
-
-/// The luminance that lights are shown at, where white is 1: bright, with room for their colours.
-const LIGHT_LUMINANCE: f64 = 0.6;
 
 /// Shares of variance below this are not shown: on a logarithmic axis the rounding errors of a complete basis would
 /// take all the room.
 const NOTHING: f64 = 1e-8;
 
-const ACCENT: &str = "#3b5b7c";
-
-/// Contents of a picture.
+/// What a picture shows.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::cli) struct Picture<'a> {
+    /// What the model is called.
+    pub(in crate::cli) name: &'a str,
     /// The model.
     pub(in crate::cli) model: &'a Model,
-    /// Its plain recipe, where it has one.
+    /// The recipe of the draws, unless it was refused.
     pub(in crate::cli) recipe: Option<&'a Recipe>,
     /// The seed of the draws.
     pub(in crate::cli) seed: u64,
+    /// The ground.
+    pub(in crate::cli) theme: Theme,
 }
 
-/// One panel: what is drawn, and on what axes.
-type Panel = (Vec<Plot>, Layout);
+/// One panel: what is drawn, on what axes, and the text around them.
+type Panel = (Vec<Plot>, Layout, Caption);
 
 impl Picture<'_> {
     /// The picture, drawn.
     pub(in crate::cli) fn drawing(&self) -> Scene {
         let draws = self.draws();
         let panels = [self.mean(), self.basis(), self.unexplained(), self.drawn(&draws)];
-        let (plots, layouts) = panels.into_iter().unzip();
-        let mut scene = Figure::new(2, 2)
+        let (mut plots, mut layouts, mut text) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, (plot, layout, caption)) in panels.into_iter().enumerate() {
+            plots.push(plot);
+            layouts.push(layout);
+            text.extend(caption.draw(&place(index), self.theme));
+        }
+        let mut drawing = Figure::new(2, 2)
             .with_plots(plots)
             .with_layouts(layouts)
             .with_cell_size(PANEL.0, PANEL.1)
             .with_spacing(GAP)
             .with_padding(GAP)
             .render();
-        HEADING.set(&mut scene);
-        scene.elements.extend(self.key((2.0 * GAP + PANEL.0, GAP)));
-        scene
+        drawing.elements.extend(self.key(place(1).corner));
+        drawing.elements.extend(text);
+        plot::head(&mut drawing, &super::title(self.name), &self.facts(), self.theme);
+        drawing
+    }
+
+    /// What the model is, and which draws are shown.
+    fn facts(&self) -> String {
+        let model = self.model;
+        let components = match model.components() {
+            1 => "1 component".to_owned(),
+            k => format!("{k} components"),
+        };
+        format!("{}s at {} nm, {components}; draws of seed {}", model.kind(), model.grid(), self.seed)
     }
 
     fn draws(&self) -> Vec<Vec<f64>> {
@@ -89,16 +102,19 @@ impl Picture<'_> {
         let low: Vec<f64> = mean.iter().zip(&deviation).map(|(m, d)| m - d).collect();
         let high: Vec<f64> = mean.iter().zip(&deviation).map(|(m, d)| m + d).collect();
         let (x, edges) = (curve(grid, &low), curve(grid, &high));
+        let colour = self.theme.colours()[0];
         let band = BandPlot::new(x.iter().map(|p| p.0), x.iter().map(|p| p.1), edges.iter().map(|p| p.1))
-            .with_color(ACCENT)
+            .with_color(colour)
             .with_opacity(0.22);
         let line =
-            LinePlot::new().with_data(curve(grid, mean.as_slice())).with_color(ACCENT).with_stroke_width(2.4);
+            LinePlot::new().with_data(curve(grid, mean.as_slice())).with_color(colour).with_stroke_width(2.2);
         let limits = self.value_limits(low.iter().chain(&high));
-        let layout = spectra(grid, limits)
-            .with_title(format!("The mean {} ± 1 standard deviation", self.model.kind()))
-            .with_y_label(self.value_label());
-        (vec![band.into(), line.into()], layout)
+        let caption = Caption {
+            title: format!("Mean {} ± 1 standard deviation", self.model.kind()),
+            note: "of the model, before any recipe".to_owned(),
+            vertical: self.value_label().to_owned(),
+        };
+        (vec![band.into(), line.into()], self.values(limits), caption)
     }
 
     /// The first basis vectors.
@@ -109,7 +125,7 @@ impl Picture<'_> {
         let line = |(index, row): (usize, &Vec<f64>)| {
             LinePlot::new()
                 .with_data(curve(grid, row))
-                .with_color(COLOURS[index])
+                .with_color(self.theme.colours()[index])
                 .with_stroke_width(if index == 0 { 2.6 } else { 1.6 })
                 .into()
         };
@@ -122,11 +138,13 @@ impl Picture<'_> {
         let limit = 1.06 * rows.iter().flatten().fold(0.0, |a: f64, v| a.max(v.abs()));
         let covered = key_height(rows.len()) / (PANEL.1 - MARGINS[2] - MARGINS[3]);
         let top = limit + 2.0 * limit * covered / (1.0 - covered);
-        let layout = spectra(grid, (-limit, top))
-            .with_title(title)
-            .with_y_label("unit vectors, and the share of variance that each explains")
-            .with_reference_line(ReferenceLine::horizontal(0.0).with_color(QUIET).with_stroke_width(0.8));
-        (plots, layout)
+        let layout = self.spectra((-limit, top)).with_reference_line(self.guide(0.0));
+        let caption = Caption {
+            title,
+            note: "and the share of variance that each explains".to_owned(),
+            vertical: "basis vector (unit length)".to_owned(),
+        };
+        (plots, layout, caption)
     }
 
     /// The key to the basis vectors: a few rows above the curves of a panel whose upper left corner is given. The
@@ -137,14 +155,15 @@ impl Picture<'_> {
         let count = explained.len().min(MAX_SHOWN);
         let column = (PANEL.0 - left - right) / KEY_COLUMNS as f64;
         let (width, height) = (PANEL.0 - left - right, key_height(count));
-        let mut elements = vec![plot::rectangle((x + left + 1.0, y + top - 1.0), (width, height), "#ffffff")];
+        let ground = self.theme.ground();
+        let mut elements = vec![plot::rectangle((x + left + 1.0, y + top - 1.0), (width, height), ground)];
         for (index, share) in explained.iter().take(count).enumerate() {
             let (row, place) = (index / key_columns(count), index % key_columns(count));
             let x = x + left + 8.0 + column * place as f64;
             let y = y + top + 8.0 + KEY_ROW * row as f64;
-            elements.push(plot::mark((x, y), 20.0, COLOURS[index], 2.6, None));
-            let name = format!("{}: {}", index + 1, percent(*share));
-            elements.push(plot::text((x + 27.0, y + 4.0), LABEL_SIZE - 1, &name, TextAnchor::Start, None));
+            elements.push(plot::mark((x, y), 16.0, self.theme.colours()[index], 2.6, None));
+            let (at, name) = ((x + 21.0, y + 4.0), format!("{}: {}", index + 1, percent(*share)));
+            elements.push(plot::text(at, TICK_SIZE, &name, TextAnchor::Start, self.theme.ink()));
         }
         elements
     }
@@ -162,45 +181,51 @@ impl Picture<'_> {
         let lowest = shown.iter().fold(100.0, |a: f64, p| a.min(p.1));
         let floor = 10f64.powf((lowest / 1.5).log10().floor());
         let colour = |&(x, _): &(f64, f64)| match x as usize {
-            k @ 1..=MAX_SHOWN => COLOURS[k - 1],
-            _ => QUIET,
+            k @ 1..=MAX_SHOWN => self.theme.colours()[k - 1],
+            _ => self.theme.quiet(),
         };
-        let line = LinePlot::new().with_data(shown.clone()).with_color(QUIET).with_stroke_width(1.4);
+        let line =
+            LinePlot::new().with_data(shown.clone()).with_color(self.theme.quiet()).with_stroke_width(1.4);
         let points = ScatterPlot::new()
             .with_data(shown.clone())
             .with_colors(shown.iter().map(colour))
             .with_size(if k <= MAX_SHOWN { 5.0 } else { 3.0 });
         let width = k as f64;
-        let mut layout = panel((-0.04 * width, 1.16 * width), (floor, 200.0))
+        let mut layout = self
+            .theme
+            .axes((-0.04 * width, 1.16 * width), (floor, 200.0), MARGINS)
             .with_log_y()
             .with_y_tick_format(TickFormat::Custom(Arc::new(decimal)))
             .with_x_tick_format(TickFormat::Custom(Arc::new(move |x| {
                 if x > width { String::new() } else { format!("{x:.0}") }
             })))
-            .with_x_label("components")
-            .with_y_label("variance left unexplained (%)")
-            .with_title(match (k, 1.0 - left[k]) {
-                (1, share) => format!("One component explains {} of the variance", percent(share)),
-                (k, share) => format!("{k} components explain {} of the variance", percent(share)),
-            });
+            .with_x_label("number of components");
+        let rest = percent(left[k].max(0.0));
+        let caption = Caption {
+            title: match k {
+                1 => format!("One component leaves {rest} of the variance"),
+                k => format!("{k} components leave {rest} of the variance"),
+            },
+            vertical: "variance unexplained (%)".to_owned(),
+            ..Caption::default()
+        };
         if k <= 20 {
             layout = layout.with_x_tick_step(if k <= 10 { 1.0 } else { 2.0 });
         }
         if k <= MAX_LABELLED {
             for &(x, y) in shown.iter().skip(1) {
                 // Above and right of its point, where the falling line is not.
-                let text = percent(1.0 - y / 100.0);
-                let text = TextAnnotation::new(text, x + 0.08 * width, y).with_font_size(LABEL_SIZE - 1);
-                layout = layout.with_annotation(text);
+                let text = TextAnnotation::new(percent(y / 100.0), x + 0.09 * width, y);
+                layout = layout.with_annotation(text.with_font_size(TICK_SIZE).with_color(self.theme.ink()));
             }
         }
-        (vec![line.into(), points.into()], layout)
+        (vec![line.into(), points.into()], layout, caption)
     }
 
     /// Draws, each in its own colour.
     fn drawn(&self, draws: &[Vec<f64>]) -> Panel {
         let grid = self.model.grid();
-        let colours = Colours::new(self.model);
+        let colours = Colours::new(self.model, self.theme);
         let stroke = match self.model.kind() {
             SpectrumKind::Reflectance => 1.15,
             SpectrumKind::Illuminant => 0.9, // they lie close together
@@ -212,22 +237,46 @@ impl Picture<'_> {
                 .with_stroke_width(stroke)
                 .into()
         };
-        let limits = self.value_limits(draws.iter().flatten());
-        let title = match (draws.len(), self.model.kind(), &colours) {
-            (0, ..) => "No draws: the plain recipe is refused".to_owned(),
-            (n, _, Colours::Unseen) => format!("{n} draws"),
-            (n, SpectrumKind::Reflectance, _) => format!("{n} draws, in their colours under D65"),
-            (n, SpectrumKind::Illuminant, _) => format!("{n} draws, in the colours of their light"),
+        let recipe = self.recipe.map(|recipe| described(recipe.settings())).unwrap_or_default();
+        let title = match (draws.len(), recipe.as_str()) {
+            (0, _) => "No draws: the recipe is refused".to_owned(),
+            (n, "") => format!("{n} draws"),
+            (n, recipe) => format!("{n} draws: {recipe}"),
         };
-        // On white, pale surfaces and all lights would drown.
-        let night = ShadedRegion::horizontal(limits.0, limits.1).with_color(DARK).with_opacity(1.0);
-        let layout = spectra(grid, limits)
-            .with_title(title)
-            .with_y_label(self.value_label())
-            .with_shaded_region(night);
+        let mut note = colours.note().to_owned();
+        let above = draws.iter().filter(|draw| draw.iter().any(|&v| v > 1.0)).count();
+        if self.model.kind() == SpectrumKind::Reflectance && above > 0 {
+            note += &format!("; {above} exceed 1");
+        }
+        let caption = Caption { title, note, vertical: self.value_label().to_owned() };
         // A panel without any line would not be drawn at all.
         let none = draws.is_empty().then(|| LinePlot::new().into());
-        (draws.iter().map(line).chain(none).collect(), layout)
+        let limits = self.value_limits(draws.iter().flatten());
+        (draws.iter().map(line).chain(none).collect(), self.values(limits), caption)
+    }
+
+    /// Axes for values of spectra, with lines at the limits of what is physical where the axes go beyond.
+    fn values(&self, (low, high): (f64, f64)) -> Layout {
+        let mut layout = self.spectra((low, high));
+        if low < 0.0 {
+            layout = layout.with_reference_line(self.guide(0.0));
+        }
+        if self.model.kind() == SpectrumKind::Reflectance && high > 1.0 {
+            layout = layout.with_reference_line(self.guide(1.0));
+        }
+        layout
+    }
+
+    /// Axes for spectra.
+    fn spectra(&self, y: (f64, f64)) -> Layout {
+        self.theme
+            .axes(limits(self.model.grid()), y, MARGINS)
+            .with_x_label("wavelength (nm)")
+            .with_y_tick_format(TickFormat::Custom(Arc::new(spectral_value)))
+    }
+
+    fn guide(&self, y: f64) -> ReferenceLine {
+        ReferenceLine::horizontal(y).with_color(self.theme.ink()).with_stroke_width(1.0)
     }
 
     fn value_label(&self) -> &'static str {
@@ -248,23 +297,56 @@ impl Picture<'_> {
     }
 }
 
-/// Conversion of a spectrum to a colour.
+/// What a recipe asks for beyond the model, for a title.
+fn described(settings: &RecipeSettings) -> String {
+    let bounds = settings.bounds.to_possible_value().expect("none is hidden");
+    let bounds = bounds.get_name();
+    let mut parts = Vec::new();
+    if let Some(lrv) = settings.lrv {
+        parts.push(format!("LRV {lrv}, bounds {bounds}"));
+    }
+    if let Some([x, y, z]) = settings.xyz {
+        parts.push(format!("XYZ {x}, {y}, {z}, bounds {bounds}"));
+    }
+    if settings.covariance_scale != 1.0 {
+        parts.push(format!("covariance × {}", settings.covariance_scale));
+    }
+    match settings.intensity {
+        None => {}
+        Some(Intensity::Fixed(factor)) => parts.push(format!("intensity {factor}")),
+        Some(Intensity::LogUniform(low, high)) => parts.push(format!("intensity {low} to {high}")),
+        Some(Intensity::Data) => parts.push("intensity of the data".to_owned()),
+    }
+    parts.join(", ")
+}
+
+/// Place of a panel, row by row.
+fn place(index: usize) -> Place {
+    let at = |place: usize, size: f64| GAP + place as f64 * (size + GAP);
+    Place { corner: (at(index % 2, PANEL.0), at(index / 2, PANEL.1)), size: PANEL, margins: MARGINS }
+}
+
+/// How a spectrum becomes a colour that shows on the ground of a theme.
 enum Colours {
-    /// Weights of X, Y and Z that make white of a perfect reflector.
-    Reflected([Vec<f64>; 3]),
-    /// Weights of X, Y and Z; the luminance is [`LIGHT_LUMINANCE`] whatever the power.
-    Emitted([Vec<f64>; 3]),
-    /// The grid has no light that the eye sees.
-    Unseen,
+    /// Weights of X, Y and Z that make white of a perfect reflector, and the luminance it is drawn with.
+    Reflected([Vec<f64>; 3], f64),
+    /// Weights of X, Y and Z, and the luminance of all lights, whatever their power.
+    Emitted([Vec<f64>; 3], f64),
+    /// The grid has no light that the eye sees; all have this colour.
+    Unseen(&'static str),
 }
 
 impl Colours {
-    fn new(model: &Model) -> Colours {
+    fn new(model: &Model, theme: Theme) -> Colours {
         let grid = model.grid();
         match (colorimetry::xyz_weights(grid), model.kind()) {
-            (None, _) => Colours::Unseen,
-            (Some(weights), SpectrumKind::Reflectance) => Colours::Reflected(weights),
-            (Some(_), SpectrumKind::Illuminant) => Colours::Emitted(colorimetry::cmf(grid)),
+            (None, _) => Colours::Unseen(theme.quiet()),
+            (Some(weights), SpectrumKind::Reflectance) => {
+                Colours::Reflected(weights, theme.white_luminance())
+            }
+            (Some(_), SpectrumKind::Illuminant) => {
+                Colours::Emitted(colorimetry::cmf(grid), theme.chromatic_luminance())
+            }
         }
     }
 
@@ -273,23 +355,24 @@ impl Colours {
         let xyz = |weights: &[Vec<f64>; 3]| {
             [0, 1, 2].map(|i| weights[i].iter().zip(spectrum).map(|(w, s)| w * s).sum::<f64>())
         };
-        let linear = match self {
-            Colours::Reflected(weights) => colorimetry::linear_srgb(xyz(weights)),
-            Colours::Emitted(weights) => shown_light(xyz(weights)),
-            Colours::Unseen => return QUIET.to_owned(),
-        };
-        plot::exact_hex(linear)
+        match self {
+            Colours::Reflected(weights, white) => {
+                plot::exact_hex(colorimetry::linear_srgb(xyz(weights)).map(|v| white * v))
+            }
+            Colours::Emitted(weights, luminance) => plot::chromatic(xyz(weights), *luminance),
+            Colours::Unseen(colour) => (*colour).to_owned(),
+        }
     }
-}
 
-/// Linear components of a light at [`LIGHT_LUMINANCE`], or below it where a component would exceed 1.
-fn shown_light(xyz: [f64; 3]) -> [f64; 3] {
-    if xyz[1] <= 0.0 {
-        return [0.5; 3];
+    /// How to read the colours.
+    fn note(&self) -> &'static str {
+        match self {
+            Colours::Reflected(_, 1.0) => "colours: under D65",
+            Colours::Reflected(..) => "colours: under D65, darkened to show on white",
+            Colours::Emitted(..) => "colours: of the light, at equal luminance",
+            Colours::Unseen(_) => "outside the visible",
+        }
     }
-    let linear = colorimetry::linear_srgb(xyz.map(|v| v * LIGHT_LUMINANCE / xyz[1]));
-    let largest = linear.into_iter().fold(1.0, f64::max);
-    linear.map(|v| v / largest)
 }
 
 /// The standard deviation of the model's spectra, band by band: the root of the diagonal of basis' . covariance .
@@ -337,13 +420,6 @@ fn limits(grid: Grid) -> (f64, f64) {
     (grid.first() - pad, grid.last() + pad)
 }
 
-/// Axes for spectra.
-fn spectra(grid: Grid, y: (f64, f64)) -> Layout {
-    panel(limits(grid), y)
-        .with_x_label("wavelength (nm)")
-        .with_y_tick_format(TickFormat::Custom(Arc::new(spectral_value)))
-}
-
 /// The most entries in a row of the key, and the height of a row.
 const KEY_COLUMNS: usize = 4;
 const KEY_ROW: f64 = 18.0;
@@ -368,27 +444,45 @@ fn decimal(value: f64) -> String {
     format!("{value:.*}", (-value.log10().floor()).clamp(0.0, 12.0) as usize)
 }
 
-/// Axes with exactly these limits, in the style that all panels share.
-fn panel(x: (f64, f64), y: (f64, f64)) -> Layout {
-    plot::axes(x, y, MARGINS, HEADING.title_size)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn drawing(model: &Model, recipe: Option<&Recipe>) -> String {
+        plot::svg(&Picture { name: "this one", model, recipe, seed: 3, theme: Theme::Light }.drawing())
+    }
+
     fn svg(model: &Model) -> String {
-        let recipe = Recipe::builder(model).build();
-        let picture = Picture { model, recipe: recipe.as_ref().ok(), seed: 0 };
-        plot::svg(&picture.drawing())
+        drawing(model, Recipe::builder(model).build().as_ref().ok())
     }
 
     #[test]
-    fn a_picture_shows_what_the_model_explains() {
+    fn a_picture_shows_what_the_model_leaves_and_explains() {
         let svg = svg(&Model::builtin("munsell-vrhel").unwrap());
-        for text in ["6 components explain 99.76 % of the variance", "1: 78.7 %", "6: 0.21 %", "200 draws"] {
+        assert_eq!(svg.split('>').next().map(|head| head.matches("font-family").count()), Some(1));
+        for text in [
+            "this one",
+            "draws of seed 3",
+            "6 components leave 0.24 % of the variance",
+            "1: 78.7 %",
+            "6: 0.21 %",
+            ">21.3 %<",
+            ">200 draws<",
+            ">reflectance<",
+        ] {
             assert!(svg.contains(text), "no {text:?}");
         }
+    }
+
+    #[test]
+    fn the_recipe_is_in_the_title_and_what_exceeds_1_is_told() {
+        let model = Model::builtin("munsell-vrhel").unwrap();
+        let recipe = Recipe::builder(&model).lrv(0.8).covariance_scale(2.0).build().unwrap();
+        let svg = drawing(&model, Some(&recipe));
+        assert!(svg.contains("200 draws: LRV 0.8, bounds base, covariance × 2"));
+        let above =
+            (0..DRAWS).filter(|&i| recipe.draw(Stream::new(3), i).spectrum().iter().any(|&v| v > 1.0));
+        assert!(svg.contains(&format!("; {} exceed 1", above.count())));
     }
 
     #[test]
@@ -401,19 +495,16 @@ mod tests {
             );
             Model::from_json("test", &text).unwrap()
         };
-        assert!(svg(&model(0.5, 550.0)).contains("One component explains 100 %"));
-        assert!(svg(&model(0.5, 900.0)).contains("200 draws<"));
+        assert!(svg(&model(0.5, 550.0)).contains("One component leaves 0 %"));
+        assert!(svg(&model(0.5, 900.0)).contains("outside the visible"));
         assert!(svg(&model(1.5, 550.0)).contains("No draws"));
     }
 
     #[test]
-    fn a_perfect_reflector_is_white_and_lights_are_not_clipped() {
+    fn a_perfect_reflector_is_white_on_dark_and_grey_on_white() {
         let model = Model::builtin("munsell-vrhel").unwrap();
-        assert_eq!(Colours::new(&model).of(&[1.0; 31]), "#ffffff");
-        let blue = shown_light([0.2, 0.05, 1.0]);
-        assert!((blue[2] - 1.0).abs() < 1e-12, "{blue:?}");
-        let day = shown_light([95.05, 100.0, 108.9]);
-        assert!(day.iter().all(|v| (v - LIGHT_LUMINANCE).abs() < 1e-3), "{day:?}");
+        let white = [Theme::Dark, Theme::Light].map(|theme| Colours::new(&model, theme).of(&[1.0; 31]));
+        assert_eq!(white, ["#ffffff", "#bcbcbc"]);
     }
 
     #[test]

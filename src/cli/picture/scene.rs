@@ -7,12 +7,12 @@
 use std::ops::Range;
 
 use kuva::render::render::{Primitive, Scene as Drawing, TextAnchor};
-use spectroll::evaluation::plot::{self, DARK, INK, PALE, QUIET, line, rectangle};
+use spectroll::evaluation::plot::{self, LABEL_SIZE, TICK_SIZE, TITLE_SIZE, Theme, line, rectangle};
 use spectroll::scene::{GroupKind, Scene, Window};
 use spectroll::{Engine, EngineError, Grid, Quantity, colorimetry};
 
 /// Tiles in a row, and rows of them.
-const TILES: (usize, usize) = (5, 2);
+const TILES: (usize, usize) = (4, 3);
 
 /// The scenes whose colours are in the diagram.
 const SCENES: u64 = 100;
@@ -21,27 +21,36 @@ const SCENES: u64 = 100;
 const POINTS: usize = 4000;
 
 /// The size of a tile without its caption, and the distance between tiles.
-const TILE: (f64, f64) = (186.0, 190.0);
+const TILE: (f64, f64) = (150.0, 160.0);
 const GAP: f64 = 16.0;
 const CAPTION: f64 = 34.0;
-const HEAD: f64 = 46.0;
+const HEAD: f64 = 34.0;
 
-/// The height of the strip of lights.
-const STRIP: f64 = 26.0;
+/// The height of the strip of lights, and its distance from the chips.
+const STRIP: (f64, f64) = (26.0, 4.0);
+
+/// The luminance of the brightest light of a scene in its strip, where white is 1.
+const BRIGHTEST: f64 = 0.7;
 
 /// Chips in a row, and rows of them; the target covers the middle ones.
 const CHIPS: (usize, usize) = (15, 13);
 const TARGET: usize = 5;
 
-/// The width of the diagram.
-const DIAGRAM: f64 = 470.0;
+/// The width of the diagram with what is written around it.
+const DIAGRAM: f64 = 452.0;
 
-/// The ends of its axes.
+/// The ends of its axes, and the length of a tenth.
 const X: (f64, f64) = (0.0, 0.8);
 const Y: (f64, f64) = (0.0, 0.9);
+const TENTH: f64 = 48.0;
+
+/// Space for the numbers on the vertical axis and for its name.
+const LEFT: f64 = 52.0;
 
 /// Scenes, and what they look like.
 pub(in crate::cli) struct Preview {
+    title: String,
+    theme: Theme,
     first: u64,
     tiles: Vec<Tile>,
     lights: Vec<Point>,
@@ -69,12 +78,17 @@ struct Point {
 }
 
 impl Preview {
+    /// Draws what is shown of these scenes of the file called `name`.
     pub(in crate::cli) fn new(
+        name: &str,
         scene: &Scene,
         engine: &Engine,
         scenes: &Range<u64>,
+        theme: Theme,
     ) -> anyhow::Result<Preview> {
         let mut preview = Preview {
+            title: format!("{}, seed {}, {} nm", super::title(name), scene.seed(), scene.grid()),
+            theme,
             first: scenes.start,
             tiles: Vec::new(),
             lights: Vec::new(),
@@ -126,7 +140,7 @@ impl Preview {
                 Some([least, values.iter().copied().fold(least, f32::max)])
             };
             self.tiles.push(Tile {
-                lights: shone.iter().map(|xyz| colour(xyz.map(|v| 0.7 * v / brightest))).collect(),
+                lights: shone.iter().map(|xyz| colour(xyz.map(|v| BRIGHTEST * v / brightest))).collect(),
                 chips: surfaces.iter().take(CHIPS.0 * CHIPS.1).map(|&xyz| colour(xyz)).collect(),
                 targets: targets.iter().map(|&xyz| colour(xyz)).collect(),
                 lrv: known(Quantity::Lrv),
@@ -134,50 +148,77 @@ impl Preview {
             });
         }
         let each = POINTS / SCENES as usize;
-        self.lights.extend(shone.iter().take(each).map(|&xyz| point(xyz.map(|v| 0.7 * v / xyz[1]))));
-        self.surfaces.extend(surfaces.iter().take(each).map(|&xyz| point(xyz)));
-        self.targets.extend(targets.iter().take(each).map(|&xyz| point(xyz)));
+        let luminance = self.theme.chromatic_luminance();
+        let points = |xyz: Vec<[f64; 3]>| xyz.into_iter().take(each).map(move |xyz| point(xyz, luminance));
+        self.lights.extend(points(shone));
+        self.surfaces.extend(points(surfaces));
+        self.targets.extend(points(targets));
     }
 
     /// The picture, drawn.
     pub(in crate::cli) fn drawing(&self) -> Drawing {
         let rows = self.tiles.len().div_ceil(TILES.0).max(1);
-        let width = TILES.0 as f64 * (TILE.0 + GAP) + DIAGRAM + 2.0 * GAP;
-        let height = HEAD + (rows as f64 * (TILE.1 + CAPTION + GAP)).max(DIAGRAM);
-        let mut drawing = Drawing::new(width, height);
-        drawing.background_color = Some("#ffffff".to_owned());
+        let top = HEAD + 30.0;
+        let tiles = TILES.0 as f64 * (TILE.0 + GAP);
+        let diagram = 10.0 * TENTH * (Y.1 - Y.0) + 60.0;
+        let height = top + (rows as f64 * (TILE.1 + CAPTION + GAP)).max(diagram);
+        let mut drawing = self.theme.canvas(GAP + tiles + DIAGRAM, height);
         let all = &mut drawing.elements;
-        all.push(text(GAP, 28.0, 16, "Lights above, surfaces under them, and the target in their middle"));
+        let ink = self.theme.ink();
+        all.push(text((GAP, 28.0), TITLE_SIZE + 4, &self.title, ink));
+        let note =
+            "lights above, surfaces under them, target in the middle; luminance of lights not to scale";
+        all.push(text((GAP, 50.0), LABEL_SIZE, note, self.theme.quiet()));
         for (i, tile) in self.tiles.iter().enumerate() {
             let x = GAP + (i % TILES.0) as f64 * (TILE.0 + GAP);
-            let y = HEAD + (i / TILES.0) as f64 * (TILE.1 + CAPTION + GAP);
-            tile.draw(all, (x, y), self.first + i as u64);
+            let y = top + (i / TILES.0) as f64 * (TILE.1 + CAPTION + GAP);
+            tile.draw(all, (x, y), self.first + i as u64, self.theme);
         }
-        self.diagram(all, (width - DIAGRAM - GAP + 40.0, HEAD), DIAGRAM - 50.0);
+        self.diagram(all, (GAP + tiles + LEFT, top));
         drawing
     }
 
     /// The chromaticities, on the diagram of CIE 1931.
-    fn diagram(&self, all: &mut Vec<Primitive>, (left, top): (f64, f64), size: f64) {
-        let unit = size / (X.1 - X.0).max(Y.1 - Y.0);
-        let bottom = top + unit * (Y.1 - Y.0) - 20.0;
-        let unit = (bottom - top) / (Y.1 - Y.0);
-        let at = |x: f64, y: f64| (left + unit * (x - X.0), bottom - unit * (y - Y.0));
-        all.push(text(left - 28.0, 28.0, 16, "Chromaticities (CIE 1931)"));
-        let (x_end, y_end) = at(X.1, Y.1);
-        all.push(rectangle((left, y_end), (x_end - left, bottom - y_end), DARK));
-        for tick in 1..=8 {
+    fn diagram(&self, all: &mut Vec<Primitive>, (left, top): (f64, f64)) {
+        let theme = self.theme;
+        let (ink, quiet) = (theme.ink(), theme.quiet());
+        let at = |x: f64, y: f64| (left + 10.0 * TENTH * (x - X.0), top + 10.0 * TENTH * (Y.1 - y));
+        let ((x_end, y_end), bottom) = (at(X.1, Y.1), at(X.0, Y.0).1);
+        for tick in 0..=9 {
             let value = f64::from(tick) / 10.0;
             let ((x, _), (_, y)) = (at(value, 0.0), at(0.0, value));
-            all.push(line(&[(x, y_end), (x, bottom)], "#2c2e35", 0.7));
-            all.push(line(&[(left, y), (x_end, y)], "#2c2e35", 0.7));
+            if value <= X.1 {
+                all.push(line(&[(x, y_end), (x, bottom)], theme.pale(), 0.8));
+            }
+            all.push(line(&[(left, y), (x_end, y)], theme.pale(), 0.8));
             if tick % 2 == 0 {
-                all.push(centred(x, bottom + 16.0, 11, &format!("{value:.1}")));
-                all.push(centred(left - 14.0, y + 4.0, 11, &format!("{value:.1}")));
+                all.push(plot::text(
+                    (x, bottom + 17.0),
+                    TICK_SIZE,
+                    &format!("{value:.1}"),
+                    TextAnchor::Middle,
+                    ink,
+                ));
+                all.push(plot::text(
+                    (left - 6.0, y + 4.0),
+                    TICK_SIZE,
+                    &format!("{value:.1}"),
+                    TextAnchor::End,
+                    ink,
+                ));
             }
         }
-        all.push(centred((left + x_end) / 2.0, bottom + 32.0, 12, "x"));
-        all.push(centred(left - 30.0, (y_end + bottom) / 2.0, 12, "y"));
+        all.push(line(&[(left, y_end), (left, bottom), (x_end, bottom)], ink, 1.0));
+        let name = |axis: char| format!("CIE 1931 chromaticity {axis}");
+        all.push(plot::text(
+            ((left + x_end) / 2.0, bottom + 38.0),
+            LABEL_SIZE,
+            &name('x'),
+            TextAnchor::Middle,
+            ink,
+        ));
+        let place = (left - 36.0, (y_end + bottom) / 2.0);
+        all.push(plot::upright(plot::text(place, LABEL_SIZE, &name('y'), TextAnchor::Middle, ink)));
         let locus = Grid::new(400.0, 1.0, 301).expect("it is a grid");
         let [x, y, z] = colorimetry::cmf(locus);
         let mut border: Vec<_> = (0..locus.len())
@@ -185,56 +226,66 @@ impl Preview {
             .map(|(x, y)| at(x, y))
             .collect();
         border.push(border[0]);
-        all.push(line(&border, "#c9cdd3", 1.2));
+        all.push(line(&border, ink, 1.2));
         for wavelength in [460, 480, 520, 540, 560, 580, 600, 620] {
             let (x, y) = border[wavelength - 400];
-            let (dx, anchor) =
-                if wavelength < 500 { (-6.0, TextAnchor::End) } else { (6.0, TextAnchor::Start) };
-            all.push(label((x + dx, y + 1.0), 10, &wavelength.to_string(), anchor, "#9aa1ab"));
+            let (dx, dy, anchor) = match wavelength {
+                ..500 => (-6.0, 2.0, TextAnchor::End),
+                _ => (6.0, -3.0, TextAnchor::Start),
+            };
+            let (at, name) = ((x + dx, y + dy), wavelength.to_string());
+            all.push(plot::text(at, TICK_SIZE - 1, &name, anchor, quiet));
         }
         let corners = [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.64, 0.33)].map(|(x, y)| at(x, y));
-        all.push(line(&corners, "#6b7079", 0.8));
-        for (points, radius, ring) in [
-            (&self.surfaces, 1.4, None),
-            (&self.targets, 3.2, Some("#ffffff")),
-            (&self.lights, 3.0, Some(DARK)),
-        ] {
-            let circle = |point: &Point| {
-                let (cx, cy) = at(point.x, point.y);
-                Primitive::Circle {
-                    cx,
-                    cy,
-                    r: radius,
-                    fill: point.colour.as_str().into(),
-                    fill_opacity: None,
-                    stroke: ring.map(Into::into),
-                    stroke_width: ring.map(|_| 0.8),
-                }
-            };
-            all.extend(points.iter().map(circle));
-        }
-        let key = [
-            (self.surfaces.len(), "surfaces (small)"),
-            (self.targets.len(), "targets (white rims)"),
-            (self.lights.len(), "lights (dark rims)"),
-            (1, "triangle: what sRGB shows"),
+        all.push(line(&corners, quiet, 0.8));
+        let symbols = [
+            (Symbol::Surface, &self.surfaces, "surfaces"),
+            (Symbol::Target, &self.targets, "targets"),
+            (Symbol::Light, &self.lights, "lights"),
         ];
-        for (row, (_, name)) in key.iter().filter(|(count, _)| *count > 0).enumerate() {
-            let (y, anchor) = (y_end + 18.0 + 16.0 * row as f64, TextAnchor::End);
-            all.push(label((x_end - 10.0, y), 11, name, anchor, "#c9cdd3"));
+        for (symbol, points, _) in symbols {
+            all.extend(points.iter().map(|point| symbol.draw(at(point.x, point.y), &point.colour, ink)));
+        }
+        let mut y = y_end + 20.0;
+        for (symbol, points, name) in symbols {
+            if !points.is_empty() {
+                all.push(symbol.draw((x_end - 96.0, y - 4.0), quiet, ink));
+                all.push(text((x_end - 84.0, y), TICK_SIZE, name, ink));
+                y += 18.0;
+            }
+        }
+        all.push(line(&[(x_end - 102.0, y - 4.0), (x_end - 90.0, y - 4.0)], quiet, 0.8));
+        all.push(text((x_end - 84.0, y), TICK_SIZE, "sRGB gamut", ink));
+    }
+}
+
+/// How a point of the diagram is drawn.
+#[derive(Clone, Copy)]
+enum Symbol {
+    Surface,
+    Target,
+    Light,
+}
+
+impl Symbol {
+    fn draw(self, at: (f64, f64), colour: &str, rim: &str) -> Primitive {
+        match self {
+            Symbol::Surface => plot::disc(at, 1.4, colour, None),
+            Symbol::Target => plot::disc(at, 3.4, colour, Some(rim)),
+            Symbol::Light => plot::diamond(at, 4.0, colour, rim),
         }
     }
 }
 
 impl Tile {
-    fn draw(&self, all: &mut Vec<Primitive>, (x, y): (f64, f64), number: u64) {
+    fn draw(&self, all: &mut Vec<Primitive>, (x, y): (f64, f64), number: u64, theme: Theme) {
         let strip = TILE.0 / self.lights.len().max(1) as f64;
         for (i, colour) in self.lights.iter().enumerate() {
-            all.push(rectangle((x + i as f64 * strip, y), (strip, STRIP), colour));
+            all.push(rectangle((x + i as f64 * strip, y), (strip, STRIP.0), colour));
         }
-        let top = y + if self.lights.is_empty() { 0.0 } else { STRIP + 4.0 };
+        let top = y + if self.lights.is_empty() { 0.0 } else { STRIP.0 + STRIP.1 };
         let chip = (TILE.0 / CHIPS.0 as f64, (y + TILE.1 - top) / CHIPS.1 as f64);
-        all.push(rectangle((x, top), (TILE.0, y + TILE.1 - top), PALE));
+        all.push(rectangle((x, top), (TILE.0, y + TILE.1 - top), theme.pale()));
         for (i, colour) in self.chips.iter().enumerate() {
             let at = (x + (i % CHIPS.0) as f64 * chip.0, top + (i / CHIPS.0) as f64 * chip.1);
             all.push(rectangle(at, chip, colour));
@@ -245,11 +296,11 @@ impl Tile {
         for (i, colour) in self.targets.iter().enumerate() {
             all.push(rectangle((at.0 + i as f64 * width, at.1), (width, size.1), colour));
         }
-        let lrv = self.lrv.map(|lrv| format!("  LRV {}", range(lrv))).unwrap_or_default();
-        all.push(text(x, y + TILE.1 + 15.0, 12, &format!("scene {number}{lrv}")));
+        let lrv = self.lrv.map(|lrv| format!(", LRV {}", range(lrv))).unwrap_or_default();
+        all.push(text((x, y + TILE.1 + 15.0), TICK_SIZE, &format!("scene {number}{lrv}"), theme.ink()));
         if let Some(intensity) = self.intensity {
-            let text = format!("lights x {}", range(intensity));
-            all.push(label((x, y + TILE.1 + 29.0), 11, &text, TextAnchor::Start, QUIET));
+            let intensity = format!("intensity {}", range(intensity));
+            all.push(text((x, y + TILE.1 + 30.0), TICK_SIZE, &intensity, theme.quiet()));
         }
     }
 }
@@ -295,19 +346,12 @@ fn colour(xyz: [f64; 3]) -> String {
     plot::hex(colorimetry::linear_srgb(xyz))
 }
 
-fn point(xyz: [f64; 3]) -> Point {
+/// The chromaticity of tristimulus values, in a colour of this luminance.
+fn point(xyz: [f64; 3], luminance: f64) -> Point {
     let sum: f64 = xyz.iter().sum();
-    Point { x: xyz[0] / sum, y: xyz[1] / sum, colour: colour(xyz) }
+    Point { x: xyz[0] / sum, y: xyz[1] / sum, colour: plot::chromatic(xyz, luminance) }
 }
 
-fn text(x: f64, y: f64, size: u32, content: &str) -> Primitive {
-    label((x, y), size, content, TextAnchor::Start, INK)
-}
-
-fn centred(x: f64, y: f64, size: u32, content: &str) -> Primitive {
-    label((x, y), size, content, TextAnchor::Middle, INK)
-}
-
-fn label((x, y): (f64, f64), size: u32, content: &str, anchor: TextAnchor, colour: &str) -> Primitive {
-    plot::text((x, y), size, content, anchor, Some(colour))
+fn text(at: (f64, f64), size: u32, content: &str, colour: &str) -> Primitive {
+    plot::text(at, size, content, TextAnchor::Start, colour)
 }

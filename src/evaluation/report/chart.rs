@@ -6,47 +6,48 @@ use kuva::prelude::{BandPlot, Layout, LinePlot, Plot, ScatterPlot, TickFormat};
 use kuva::render::figure::Figure;
 use kuva::render::render::{Primitive, TextAnchor};
 
-use crate::evaluation::plot::{self, Heading, LABEL_SIZE};
+use crate::evaluation::plot::{self, Caption, Place, TICK_SIZE, Theme};
 
-/// Size of a chart, and its room for text on the left, right and bottom.
+/// The report is a white page.
+const THEME: Theme = Theme::Light;
+
+/// Size of a chart, and what it leaves for text on its left, right and bottom.
 const SIZE: (f64, f64) = (640.0, 430.0);
-const MARGINS: [f64; 3] = [64.0, 18.0, 48.0];
+const MARGINS: [f64; 3] = [84.0, 18.0, 50.0];
 
-/// Height above the axes for the title and the name of the vertical axis, and for each row of the key.
-const HEAD: f64 = 58.0;
-const KEY_ROW: f64 = 18.0;
+/// Height above the axes for the title, and for each row of the key.
+const HEAD: f64 = 40.0;
+const KEY_ROW: f64 = 19.0;
 
-const HEADING: Heading = Heading { title_size: 15, x: 12.0, title: 21.0, label: 40.0 };
+/// About the width of a character of the key.
+const CHARACTER: f64 = 6.9;
 
-/// Approximate width of a character of the key.
-const CHARACTER: f64 = 6.2;
-
-/// Colour of guides.
-pub(super) const GUIDE: &str = plot::QUIET;
+/// Colour of what only guides the eye.
+pub(super) const GUIDE: &str = THEME.quiet();
 
 /// Colours that show on thin lines.
 pub(super) const COLOURS: [&str; 6] = {
-    let all = plot::COLOURS;
+    let all = THEME.colours();
     [all[0], all[1], all[2], all[3], all[4], all[6]]
 };
 
-/// Axis of a chart.
+/// An axis.
 pub(super) struct Axis {
     pub(super) label: String,
     pub(super) limits: (f64, f64),
     pub(super) logarithmic: bool,
 }
 
-/// Style of a series.
+/// How a series is drawn.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
     /// Points joined by a line.
     Line,
     /// A line without points.
     Plain,
-    /// A broken line.
+    /// A broken one.
     Dashed,
-    /// A dotted line.
+    /// One of dots.
     Dotted,
     /// Points alone.
     Points,
@@ -54,7 +55,7 @@ pub(super) enum Style {
     Steps,
 }
 
-/// Series of points, with the range of each down and up where given.
+/// Points, and where given how far down and up each may be.
 pub(super) struct Series {
     pub(super) name: String,
     pub(super) colour: &'static str,
@@ -76,7 +77,7 @@ impl Axis {
         Axis { label: label.to_owned(), limits, logarithmic: false }
     }
 
-    /// Makes a logarithmic axis that holds all positive values, from a 1, 2 or 5 to another.
+    /// A logarithmic axis that holds all positive values, from a 1, 2 or 5 to another.
     pub(super) fn decades(label: &str, values: impl IntoIterator<Item = f64>) -> Axis {
         let values = values.into_iter().filter(|&v| v > 0.0 && v.is_finite());
         let (low, high) = values.fold((f64::INFINITY, 0f64), |(a, b), v| (a.min(v), b.max(v)));
@@ -85,7 +86,7 @@ impl Axis {
         Axis { label: label.to_owned(), limits, logarithmic: true }
     }
 
-    /// Divisor of values before plotting: kuva takes all below 1e-10 for that on a logarithmic axis.
+    /// What values are divided by to be plotted: kuva takes all below 1e-10 for that on a logarithmic axis.
     fn unit(&self) -> f64 {
         let decade = 10f64.powf(self.limits.0.log10().floor());
         if self.logarithmic && decade < 1e-9 { decade } else { 1.0 }
@@ -137,7 +138,7 @@ impl Series {
 }
 
 impl Chart {
-    /// Draws the chart as SVG.
+    /// The chart as SVG.
     pub(super) fn svg(&self) -> String {
         let keys = self.keys();
         let rows = keys.iter().map(|key| key.row + 1).max().unwrap_or(0);
@@ -151,7 +152,11 @@ impl Chart {
             .with_spacing(0.0)
             .with_padding(0.0)
             .render();
-        HEADING.set(&mut scene);
+        let [left, right, bottom] = MARGINS;
+        let place = Place { corner: (0.0, 0.0), size: SIZE, margins: [left, right, top, bottom] };
+        let caption =
+            Caption { title: self.title.clone(), vertical: self.y.label.clone(), ..Caption::default() };
+        scene.elements.extend(caption.draw(&place, THEME));
         for key in keys {
             scene.elements.extend(key.draw(HEAD));
         }
@@ -162,10 +167,8 @@ impl Chart {
         let plotted = |axis: &Axis| (axis.limits.0 / axis.unit(), axis.limits.1 / axis.unit());
         let [left, right, bottom] = MARGINS;
         let margins = [left, right, top, bottom];
-        let mut layout = plot::axes(plotted(&self.x), plotted(&self.y), margins, HEADING.title_size)
-            .with_title(self.title.clone())
-            .with_x_label(self.x.label.clone())
-            .with_y_label(self.y.label.clone());
+        let mut layout =
+            THEME.axes(plotted(&self.x), plotted(&self.y), margins).with_x_label(self.x.label.clone());
         if self.x.logarithmic {
             layout = layout.with_log_x().with_x_tick_format(powers(&self.x));
         }
@@ -193,7 +196,7 @@ impl Chart {
     }
 }
 
-/// Entry of the key.
+/// An entry of the key.
 struct Key<'a> {
     series: &'a Series,
     x: f64,
@@ -204,15 +207,7 @@ impl Key<'_> {
     fn draw(&self, top: f64) -> Vec<Primitive> {
         let y = top + KEY_ROW * self.row as f64;
         let mark = match self.series.style {
-            Style::Points => Primitive::Circle {
-                cx: self.x + 11.0,
-                cy: y,
-                r: 3.6,
-                fill: self.series.colour.into(),
-                fill_opacity: None,
-                stroke: None,
-                stroke_width: None,
-            },
+            Style::Points => plot::disc((self.x + 11.0, y), 3.6, self.series.colour, None),
             style => {
                 let dashes = match style {
                     Style::Dashed => Some("6 3"),
@@ -223,13 +218,13 @@ impl Key<'_> {
             }
         };
         let (at, name) = ((self.x + 28.0, y + 4.0), &self.series.name);
-        let text = plot::text(at, LABEL_SIZE - 1, name, TextAnchor::Start, None);
+        let text = plot::text(at, TICK_SIZE, name, TextAnchor::Start, THEME.ink());
         vec![mark, text]
     }
 }
 
-/// Formats powers of ten as such, unless all are short. Numbers between them are named where there is room, on axes
-/// of two decades or less.
+/// Powers of ten as such, unless all are short. What lies between them is named where there is room, on axes of two
+/// decades or less.
 fn powers(axis: &Axis) -> TickFormat {
     let ((low, high), unit) = (axis.limits, axis.unit());
     let (few, short) = (high / low < 101.0, low > 0.9e-3 && high < 1.1e4);
@@ -249,7 +244,7 @@ fn powers(axis: &Axis) -> TickFormat {
     }))
 }
 
-/// Writes a number in superscript.
+/// A number in superscript.
 pub(super) fn superscript(n: i32) -> String {
     let digit = |c: char| match c {
         '-' => '⁻',

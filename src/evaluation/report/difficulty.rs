@@ -1,5 +1,7 @@
 //! Cost against difficulty: time per draw where few candidates are accepted.
 
+use std::fmt;
+
 use serde::Serialize;
 
 use super::estimate::median;
@@ -19,13 +21,39 @@ pub struct Difficulty {
     pub refused: Vec<String>,
 }
 
+/// Setting that makes acceptable spectra unlikely.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Difficult {
+    /// Factor of the weights' covariance.
+    CovarianceScale(f64),
+    /// Target luminous reflectance, with bounds on the scaled spectrum.
+    Lrv(f64),
+}
+
+impl Difficult {
+    fn recipe(self, model: &Model) -> RecipeBuilder {
+        match self {
+            Difficult::CovarianceScale(factor) => Recipe::builder(model).covariance_scale(factor),
+            Difficult::Lrv(lrv) => Recipe::builder(model).lrv(lrv).bounds(Bounds::Scaled),
+        }
+    }
+}
+
+impl fmt::Display for Difficult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Difficult::CovarianceScale(factor) => write!(f, "covariance × {factor}"),
+            Difficult::Lrv(lrv) => write!(f, "LRV {lrv}, scaled"),
+        }
+    }
+}
+
 /// A recipe on an engine.
 #[derive(Clone, Debug, Serialize)]
 pub struct Task {
-    /// Name of the recipe: the setting that makes it difficult.
-    pub name: String,
-    /// Whether that setting is the covariance's scale; else it is the target LRV.
-    pub by_scale: bool,
+    /// The setting that makes it difficult.
+    pub setting: Difficult,
     /// The engine, as an index into the report's.
     pub engine: usize,
     /// Number of draws of each run.
@@ -50,11 +78,9 @@ impl Task {
 pub(super) fn measure(bench: &Bench, name: &str, model: &Model) -> Result<Difficulty, ReportError> {
     let (mut tasks, mut refused) = (Vec::new(), Vec::new());
     let candidates = bench.effort.pick(3e5, 1e7, 3e7);
-    let both = |(task, by_scale, builder): (String, bool, RecipeBuilder)| {
-        [ProposalKind::Plain, ProposalKind::Cover]
-            .map(|p| (task.clone(), by_scale, p, builder.clone().proposal(p)))
-    };
-    for (task, by_scale, proposal, builder) in recipes(bench, model).into_iter().flat_map(both) {
+    let both = |setting: Difficult| [ProposalKind::Plain, ProposalKind::Cover].map(|kind| (setting, kind));
+    for (setting, proposal) in settings(bench, model).into_iter().flat_map(both) {
+        let (task, builder) = (setting.to_string(), setting.recipe(model).proposal(proposal));
         let recipe = match builder.build() {
             Ok(recipe) => recipe,
             // Of what plain rejection cannot reach, and models too large for a cover, the other tells.
@@ -80,8 +106,7 @@ pub(super) fn measure(bench: &Bench, name: &str, model: &Model) -> Result<Diffic
                 attempts += took;
             }
             tasks.push(Task {
-                name: task.clone(),
-                by_scale,
+                setting,
                 engine,
                 draws,
                 covered,
@@ -94,14 +119,13 @@ pub(super) fn measure(bench: &Bench, name: &str, model: &Model) -> Result<Diffic
     Ok(Difficulty { tasks, refused })
 }
 
-/// Makes recipes from easy ones to those that no plain rejection reaches.
-fn recipes(bench: &Bench, model: &Model) -> Vec<(String, bool, RecipeBuilder)> {
+/// Settings from easy ones to those that no plain rejection reaches.
+fn settings(bench: &Bench, model: &Model) -> Vec<Difficult> {
     let scales = bench.effort.pick(
         vec![0.01, 1.0, 4.0, 25.0, 100.0, 1e4, 1e6],
         vec![0.01, 0.1, 1.0, 2.0, 4.0, 10.0, 25.0, 50.0, 100.0, 250.0, 1e3, 1e4, 1e5, 1e6],
         vec![0.01, 0.1, 1.0, 2.0, 4.0, 10.0, 25.0, 50.0, 100.0, 150.0, 250.0, 1e3, 1e4, 1e5, 1e6],
     );
-    let scaled = |c: f64| (format!("covariance × {c}"), true, Recipe::builder(model).covariance_scale(c));
     let targets = match model.kind() {
         SpectrumKind::Illuminant => vec![],
         SpectrumKind::Reflectance => bench.effort.pick(
@@ -110,7 +134,6 @@ fn recipes(bench: &Bench, model: &Model) -> Vec<(String, bool, RecipeBuilder)> {
             vec![0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.97, 0.98, 0.985, 0.99, 0.992],
         ),
     };
-    let target =
-        |y: f64| (format!("LRV {y}, scaled"), false, Recipe::builder(model).lrv(y).bounds(Bounds::Scaled));
-    scales.into_iter().map(scaled).chain(targets.into_iter().map(target)).collect()
+    let targets = targets.into_iter().map(Difficult::Lrv);
+    scales.into_iter().map(Difficult::CovarianceScale).chain(targets).collect()
 }

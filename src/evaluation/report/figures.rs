@@ -1,7 +1,7 @@
 //! Figures of a report: each with a caption and its sources.
 
 use super::chart::{Axis, COLOURS, Chart, GUIDE, Series, Style};
-use super::{ModelReport, Point, Report};
+use super::{Difficult, ModelReport, Point, Report};
 
 /// Figure of a report.
 #[derive(Clone, Debug)]
@@ -55,7 +55,7 @@ struct Drawing<'a> {
 
 /// Quantities whose errors are plotted.
 const QUANTITIES: [(&str, &str); 3] =
-    [("mean spectrum", ""), ("covariance", " (in parts of it)"), ("acceptance", "")];
+    [("mean spectrum", ""), ("covariance", " (relative to it)"), ("acceptance", "")];
 
 impl Drawing<'_> {
     fn figure(&self, name: &str, section: usize, chart: &Chart, see: String, numbers: &str) -> Figure {
@@ -187,7 +187,7 @@ impl Drawing<'_> {
             format!("{name} {:.3} ({:.3} to {:.3})", m.slope.value, m.slope.low, m.slope.high)
         });
         let chart = Chart {
-            title: "Error of the mean spectrum, in parts of what chance alone makes".to_owned(),
+            title: "Error of the mean spectrum relative to that of chance alone".to_owned(),
             x: Axis { limits: (first / 2.0, 3.0 * last), ..Axis::decades("number of draws", [first, last]) },
             y: Axis::linear("error × √draws ÷ the same of the reference", (0.0, 1.05 * most)),
             series,
@@ -287,17 +287,13 @@ impl Drawing<'_> {
     }
 
     fn attempts(&self) -> Figure {
-        let points = |by_scale: bool| {
-            let tasks = self
-                .model
-                .difficulty
-                .tasks
-                .iter()
-                .filter(|t| t.engine == 0 && t.by_scale == by_scale && !t.covered);
-            let value = |name: &str| name.trim_start_matches("covariance × ").parse().unwrap_or(0.0);
-            tasks.map(|t| (value(&t.name), t.attempts())).collect::<Vec<(f64, f64)>>()
-        };
-        let scales = points(true);
+        let tasks = self.model.difficulty.tasks.iter().filter(|task| task.engine == 0 && !task.covered);
+        let scales: Vec<_> = tasks
+            .filter_map(|task| match task.setting {
+                Difficult::CovarianceScale(factor) => Some((factor, task.attempts())),
+                Difficult::Lrv(_) => None,
+            })
+            .collect();
         let chart = Chart {
             title: "Candidates for a draw against the spread asked for".to_owned(),
             x: Axis::decades("factor of the weights’ covariance", scales.iter().map(|p| p.0)),

@@ -25,7 +25,7 @@ use serde::Serialize;
 
 pub use accuracy::{Accuracy, Errors, Variant};
 pub use convergence::{Convergence, Merit, Point, Reference};
-pub use difficulty::{Difficulty, Task};
+pub use difficulty::{Difficult, Difficulty, Task};
 pub use engines::EngineFacts;
 pub use estimate::Confidence;
 pub use fidelity::{AboveOne, Fidelity, Shrinkage, Spread};
