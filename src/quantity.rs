@@ -43,10 +43,10 @@ impl Quantity {
         Quantity::Chromaticity,
     ];
 
-    /// Those that tristimulus values give.
+    /// The quantities that tristimulus values give.
     pub(crate) const COLOURS: &[Quantity] = &[Quantity::Xyz, Quantity::LinearSrgb, Quantity::Chromaticity];
 
-    /// How many there are.
+    /// Number of quantities.
     pub(crate) const COUNT: usize = Quantity::ALL.len();
 
     /// Name of the axis of its values within a draw, in files; `None` where a draw has one value.

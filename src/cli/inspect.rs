@@ -143,8 +143,8 @@ fn candidates(recipe: &Recipe) -> String {
 
 fn share(probability: f64) -> String {
     match probability {
-        0.01.. => format!("{:.2} % of the model's spectra obey the rule", 100.0 * probability),
-        _ => format!("{probability:.3e} of the model's spectra obey the rule"),
+        0.01.. => format!("{:.2} % of the model's spectra are accepted", 100.0 * probability),
+        _ => format!("{probability:.3e} of the model's spectra are accepted"),
     }
 }
 

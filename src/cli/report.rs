@@ -128,7 +128,7 @@ fn write(folder: &PendingFolder, report: &Report) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What tells a folder of ours from others, which `--force` must not remove.
+/// Mark that tells a folder of ours from others, which `--force` must not remove.
 const REPORT: FolderMark =
     FolderMark { name: "a report", is_ours: |path| path.join("report.json").is_file() };
 

@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
 struct Report {
     model: String,
     output: String,
-    /// How many files of text, in a folder.
+    /// Number of text files, in a folder.
     files: Option<u64>,
     bands: usize,
     wavelengths: String,

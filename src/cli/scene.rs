@@ -71,7 +71,7 @@ pub(crate) struct Arguments {
 struct Report {
     scene: String,
     output: Option<String>,
-    /// How many files of text, in a folder.
+    /// Number of text files, in a folder.
     files: Option<u64>,
     wavelengths: String,
     seed: u64,
@@ -164,7 +164,7 @@ struct Job<'a> {
     export: SceneExport<'a>,
 }
 
-/// What is to be written.
+/// A data set to be written.
 struct Planned {
     output: Output,
     schema: Schema,
@@ -172,7 +172,7 @@ struct Planned {
 }
 
 impl Planned {
-    /// How many files of text, where they make a folder.
+    /// Number of text files, where they make a folder.
     fn files(&self) -> Option<u64> {
         self.output.text_files(&self.schema, &self.companions)
     }
@@ -198,7 +198,7 @@ impl Job<'_> {
         self.scenes.end - self.scenes.start
     }
 
-    /// What is to be written and how, if that can be.
+    /// Plans the data set, if it can be written.
     fn planned(&self) -> anyhow::Result<Planned> {
         if self.arguments.json && self.arguments.output.to_stdout() {
             return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());

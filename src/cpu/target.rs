@@ -25,7 +25,7 @@ impl<R: Real> LrvTarget<R> {
         lrv
     }
 
-    /// What scales spectra to their targets.
+    /// Factor that scales spectra to their targets.
     #[inline(always)]
     pub(super) fn factor<const L: usize>(&self, spectrum: &[[R; L]], targets: &[R; L]) -> [R; L] {
         let mut lrv = [R::ZERO; L];
@@ -82,7 +82,8 @@ mod tests {
         assert_eq!(double.of(0x8000_0000), 0.2 + (0.6 - 0.2) * (0.5 + 0.5f64.powi(33)));
     }
 
-    /// Where f32 has no room between the ends, sums that round past the upper one stay at it.
+    /// No sum exceeds the upper end, even where f32 has no room between the ends: those that round past it stay at
+    /// it.
     #[test]
     fn no_target_is_above_the_range() {
         for step in 0..2000 {

@@ -16,7 +16,7 @@ pub(super) struct Matrix {
     pub(super) values: Vec<f64>,
 }
 
-/// What a file holds.
+/// Contents of a file.
 #[derive(Default)]
 pub(super) struct Matrices {
     /// Its numeric arrays.

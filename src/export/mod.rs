@@ -51,7 +51,7 @@ pub trait Rows {
 /// Takes the columns of some rows, and their number.
 pub type Window<'a> = dyn FnMut(&[&[u8]], u64) -> Result<(), ExportError> + 'a;
 
-/// What formats need to know of a data set besides its rows, and what it leaves beside them.
+/// Parts of a data set besides its rows: what formats need to know, and small files that lie beside the rows.
 #[derive(Clone, Debug)]
 pub struct Companions {
     /// The arrays of spectra.

@@ -90,10 +90,10 @@ pub struct PendingFolder {
     ours: FolderMark,
 }
 
-/// What tells folders that a program made from others, which it must not replace.
+/// Mark of folders that a program made, which tells them from others, and so from those it must not replace.
 #[derive(Clone, Copy, Debug)]
 pub struct FolderMark {
-    /// What such a folder is called, as in "a report".
+    /// Description of such a folder, as in "a report".
     pub name: &'static str,
     /// Whether a folder is one.
     pub is_ours: fn(&Path) -> bool,
@@ -114,7 +114,7 @@ impl PendingFolder {
         }
     }
 
-    /// Where it is being made.
+    /// Path of the folder until it is complete.
     pub fn temporary_path(&self) -> &Path {
         self.making.path()
     }

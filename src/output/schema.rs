@@ -205,13 +205,13 @@ pub struct SpectraArray {
 pub enum LrvLabel {
     /// None.
     None,
-    /// The same of all.
+    /// One luminous reflectance for all spectra.
     Same(f64),
     /// One for each spectrum, in the field of this name.
     Field(String),
 }
 
-/// What a data set holds.
+/// Schema of a data set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Schema {
     /// Fields, in the order in which their columns are delivered.

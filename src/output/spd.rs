@@ -21,7 +21,7 @@ use crate::dataset::SpectrumKind;
 /// Largest number of files written without confirmation: folders of more are slow to open, and to delete.
 pub const MOST_FILES: u64 = 10_000;
 
-/// What tells our folders from others: nothing is in them but files of our names.
+/// Mark that tells our folders from others: nothing is in them but files of our names.
 const FOLDER: FolderMark = FolderMark { name: "a folder of .spd files of this program alone", is_ours };
 
 /// Writer of a folder that appears under its name only when it is complete.
@@ -40,7 +40,7 @@ struct Column {
     array: SpectraArray,
     /// The number of the field.
     field: usize,
-    /// That of the field of their luminous reflectances, where they have one.
+    /// Number of the field of their luminous reflectances, where they have one.
     lrv: Option<usize>,
 }
 
@@ -155,7 +155,7 @@ pub(super) fn holds(schema: &Schema, spectra: &[SpectraArray]) -> bool {
     names.clone().any(is_spectra) && names.all(|name| is_spectra(name) || is_label(name))
 }
 
-/// How many spectra a row has.
+/// Number of spectra per row.
 fn per_row(field: &Field) -> usize {
     field.outer.as_ref().map_or(1, |(_, count)| *count)
 }

@@ -152,13 +152,13 @@ impl Program {
         self.intensity.is_some() || self.has_own_targets()
     }
 
-    /// The same with every draw at the largest target.
+    /// Returns the program with every draw at the largest target.
     pub(crate) fn at_largest_target(&self) -> Program {
         let fixed = |target: LrvTarget| LrvTarget { lrv: LrvLaw::Fixed(target.lrv.largest()), ..target };
         Program { target: self.target.clone().map(fixed), ..self.clone() }
     }
 
-    /// What the values of spectra that come out are between.
+    /// Range of values that the spectra may take.
     pub(crate) fn value_range(&self) -> ValueRange {
         match self.kind {
             SpectrumKind::Reflectance if !self.may_exceed_one() => ValueRange::Unit,

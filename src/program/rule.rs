@@ -52,7 +52,7 @@ impl LrvTarget {
 /// The luminous reflectance value (LRV) that a draw is scaled to, in (0, 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum LrvLaw<R = f64> {
-    /// The same for every draw.
+    /// One target for every draw.
     Fixed(R),
     /// A function of one uniform word u of the draw: low + span u, or `high` where rounding takes that above it.
     Uniform { low: R, span: R, high: R },

@@ -291,7 +291,7 @@ impl RecipeBuilder {
         })
     }
 
-    /// What giving the tristimulus values does to this model.
+    /// Effect of the given tristimulus values on this model.
     pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
         if self.model.kind() == SpectrumKind::Illuminant {
             return Err(RecipeError::XyzOfIlluminant);

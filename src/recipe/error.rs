@@ -78,7 +78,7 @@ pub enum RecipeError {
     )]
     Scale { value: f64, low: f64, high: f64 },
     #[error(
-        "no spectrum of this model obeys the rule: the bounds at {} leave no room",
+        "no spectrum of this model can be accepted: the bounds at {} leave no room",
         nanometres(wavelengths)
     )]
     Empty { wavelengths: Vec<f64> },

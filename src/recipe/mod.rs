@@ -77,7 +77,7 @@ pub enum ProposalKind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "settings::LrvRecord", into = "settings::LrvRecord")]
 pub enum Lrv {
-    /// The same for every draw.
+    /// One luminous reflectance for every draw.
     Fixed(f64),
     /// One of its own for each draw, uniform between the two. It belongs to the draw and not to a candidate: where the
     /// scaled spectrum is bounded, a light target takes more candidates, and is as frequent as a dark one.
@@ -97,7 +97,7 @@ impl From<Range<f64>> for Lrv {
     }
 }
 
-/// What an illuminant is multiplied by.
+/// Factor of an illuminant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intensity {

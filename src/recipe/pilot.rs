@@ -9,7 +9,8 @@ use crate::random::stream::Stream;
 /// Number of candidates of a pilot run.
 pub(super) const PILOT: u64 = 1 << 16;
 
-/// How many whole draws estimate it at least: enough for 1 part in 10, at some 10^6 candidates in the worst case.
+/// Smallest number of whole draws for an estimate: enough for 1 part in 10, at some 10^6 candidates in the worst
+/// case.
 const LEAST_DRAWS: u64 = 256;
 
 /// The probability that a draw finds no candidate within its attempts, above which a recipe is refused: one failure

@@ -14,7 +14,7 @@ use crate::quantity::Quantity;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecipeSettings {
-    /// The target luminous reflectance value (LRV).
+    /// The target luminous reflectance (LRV).
     pub lrv: Option<Lrv>,
     /// The target tristimulus values under D65.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -10,7 +10,7 @@ use crate::recipe::RecipeError;
 
 use super::group::QUANTITIES;
 
-/// Why a scene is none.
+/// Error returned where a scene cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 #[error("{place}: {problem}")]
 pub struct SceneError {

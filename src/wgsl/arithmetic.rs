@@ -64,7 +64,7 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables) -> String {
     text.0
 }
 
-/// What scales a candidate to the target, and each draw's target where it has its own.
+/// Writes the factor that scales a candidate to the target, and each draw's target where it has its own.
 fn factor(text: &mut Text, target: &LrvTarget) {
     let floor = <f32 as Arithmetic>::FLOOR;
     match target.lrv {

@@ -15,8 +15,8 @@ use crate::cli::parse::count;
 /// The options of what is written.
 #[derive(clap::Args)]
 pub(in crate::cli) struct OutputArguments {
-    /// Where to: .npy, .npz, .csv, .h5, .mat, .parquet or .zarr; FOLDER/ with --format npy, parquet or
-    /// spd; - is CSV on standard output
+    /// Write to this file: .npy, .npz, .csv, .h5, .mat, .parquet or .zarr; FOLDER/ with --format npy, parquet or spd;
+    /// or -, which is CSV on standard output
     // The parser of paths would not take the empty one that stands for none in `scene`.
     #[arg(short, long, value_name = "OUT", value_parser = OsStringValueParser::new().map(PathBuf::from))]
     pub(in crate::cli) output: PathBuf,

@@ -6,7 +6,7 @@ use spectroll::{
     RecipeError, RecipeSettings, XyzScale,
 };
 
-/// The rule that draws must meet, and the quantities to write of them.
+/// Settings of the draws, and the quantities to write of them.
 #[derive(Clone, clap::Args)]
 pub(in crate::cli) struct RecipeArguments {
     /// Scale every reflectance to this luminous reflectance value (LRV): CIE Y of the 1931 2 degree observer under D65,
@@ -14,7 +14,7 @@ pub(in crate::cli) struct RecipeArguments {
     /// writes it)
     #[arg(long, value_name = "Y|LOW..HIGH", allow_negative_numbers = true, value_parser = lrv)]
     pub(in crate::cli) lrv: Option<Lrv>,
-    /// What must be between 0 and 1 where there is an --lrv
+    /// Spectrum that must be between 0 and 1 where there is an --lrv
     #[arg(long, value_enum, default_value = "base", requires = "lrv")]
     bounds: Bounds,
     /// Multiply the covariance of the weights

@@ -32,7 +32,7 @@ pub(super) fn format(path: &Path) -> Result<PictureFormat, Usage> {
     PictureFormat::of(path).ok_or_else(unknown)
 }
 
-/// What a picture calls the file or built-in model that it shows: no folders, which mean nothing to readers of a picture.
+/// Name in a picture of the file or built-in model that it shows: no folders, which mean nothing to readers of a picture.
 fn title(name: &str) -> String {
     Path::new(name).file_name().map_or_else(|| name.to_owned(), |name| name.to_string_lossy().into_owned())
 }

@@ -16,7 +16,7 @@ use spectroll::{Grid, Intensity, Model, Recipe, RecipeSettings, SpectrumKind, St
 /// The size of a panel; two by two make a picture.
 const PANEL: (f64, f64) = (430.0, 330.0);
 
-/// What a panel leaves for text on its left, right, top and bottom: the same for all, so that their axes align.
+/// Margins of a panel for text on its left, right, top and bottom: the same for all, so that their axes align.
 const MARGINS: [f64; 4] = [70.0, 14.0, 52.0, 48.0];
 
 /// Between panels and around them.
@@ -35,10 +35,10 @@ const MAX_LABELLED: usize = 8;
 /// take all the room.
 const NOTHING: f64 = 1e-8;
 
-/// What a picture shows.
+/// Contents of a picture.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::cli) struct Picture<'a> {
-    /// What the model is called.
+    /// Name of the model.
     pub(in crate::cli) name: &'a str,
     /// The model.
     pub(in crate::cli) model: &'a Model,
@@ -77,7 +77,7 @@ impl Picture<'_> {
         drawing
     }
 
-    /// What the model is, and which draws are shown.
+    /// Describes the model, and the draws that are shown.
     fn facts(&self) -> String {
         let model = self.model;
         let components = match model.components() {
@@ -297,7 +297,7 @@ impl Picture<'_> {
     }
 }
 
-/// What a recipe asks for beyond the model, for a title.
+/// Describes the settings of a recipe, for a title.
 fn described(settings: &RecipeSettings) -> String {
     let bounds = settings.bounds.to_possible_value().expect("none is hidden");
     let bounds = bounds.get_name();
@@ -326,7 +326,7 @@ fn place(index: usize) -> Place {
     Place { corner: (at(index % 2, PANEL.0), at(index / 2, PANEL.1)), size: PANEL, margins: MARGINS }
 }
 
-/// How a spectrum becomes a colour that shows on the ground of a theme.
+/// Conversion of a spectrum to a colour that shows on the ground of a theme.
 enum Colours {
     /// Weights of X, Y and Z that make white of a perfect reflector, and the luminance it is drawn with.
     Reflected([Vec<f64>; 3], f64),
@@ -364,7 +364,7 @@ impl Colours {
         }
     }
 
-    /// How to read the colours.
+    /// Explains the colours.
     fn note(&self) -> &'static str {
         match self {
             Colours::Reflected(_, 1.0) => "colours: under D65",

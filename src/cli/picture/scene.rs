@@ -259,7 +259,7 @@ impl Preview {
     }
 }
 
-/// How a point of the diagram is drawn.
+/// Style of a point of the diagram.
 #[derive(Clone, Copy)]
 enum Symbol {
     Surface,

@@ -26,9 +26,9 @@ pub(in crate::cli) struct DryRun {
     arrays: Vec<Array>,
     /// Size in bytes; approximate for text.
     bytes: u64,
-    /// How many files there would be of text, in a folder.
+    /// Number of text files, in a folder.
     files: Option<u64>,
-    /// How many chunks there would be, and how many draws each has; nothing of a single file.
+    /// Number of chunks, and of draws in each; `None` for a single file.
     chunks: Option<(u64, u64)>,
     /// The share of candidates that are accepted.
     acceptance: f64,
@@ -124,7 +124,7 @@ impl DryRun {
     }
 }
 
-/// What is made where the name may look like that of a file.
+/// Describes the folder to be made, where its name may look like that of a file.
 pub(in crate::cli) fn folder_of(files: u64) -> String {
     let plural = if files == 1 { "" } else { "s" };
     format!("a folder of {} file{plural}", grouped(files))

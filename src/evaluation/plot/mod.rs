@@ -134,7 +134,7 @@ pub fn text((x, y): (f64, f64), size: u32, content: &str, anchor: TextAnchor, co
     Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color }
 }
 
-/// The same text, read from below to above.
+/// Turns a line of text, to read from below to above.
 pub fn upright(text: Primitive) -> Primitive {
     match text {
         Primitive::Text { x, y, content, size, anchor, bold, color, .. } => {

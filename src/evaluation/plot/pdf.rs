@@ -23,7 +23,7 @@ const POINT: f64 = 0.75;
 /// Name of the subset: six capitals, by the rules of PDF, and the typeface.
 const FONT: Name = Name(b"SPECTR+DejaVuSans");
 
-/// The same in the page's resources.
+/// Name in the page's resources.
 const FONT_KEY: Name = Name(b"F");
 
 /// Distance of the control points of a quarter circle from its ends, relative to the radius.
@@ -40,7 +40,7 @@ pub(super) fn document(drawing: &Scene) -> Result<Vec<u8>, String> {
     page.finish(&typeface)
 }
 
-/// How a shape is painted.
+/// Painting of a shape.
 #[derive(Clone, Copy, Default)]
 struct Paint<'a> {
     fill: Option<&'a Color>,

@@ -15,7 +15,7 @@ pub const TITLE_SIZE: u32 = 15;
 /// Colours that the colour-blind too tell apart (Okabe and Ito's without their yellow), and two more.
 const ON_WHITE: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6b4c9a", "#7f7f7f"];
-/// The same hues, lighter.
+/// Lighter shades of the hues.
 const ON_DARK: [&str; 8] =
     ["#4aa3df", "#ff8c42", "#2ec4a0", "#e3a0c6", "#f2c14e", "#a6dcf9", "#a88bd6", "#a9adb5"];
 
@@ -134,7 +134,7 @@ pub struct Place {
 pub struct Caption {
     /// The title.
     pub title: String,
-    /// What else must be known to read the panel.
+    /// Further remarks that a reader of the panel needs.
     pub note: String,
     /// Name and unit of the vertical axis.
     pub vertical: String,

@@ -63,11 +63,11 @@ pub(super) fn outlined(drawing: &Scene) -> Result<Scene, String> {
 
 /// Contours of glyphs, in units of the typeface.
 struct Contours {
-    /// Where the text is anchored, units of the drawing for one of the typeface, and sine and cosine of the turn.
+    /// Anchor of the text, units of the drawing for one of the typeface, and sine and cosine of the turn.
     origin: (f64, f64),
     scale: f64,
     turn: (f64, f64),
-    /// Where the next glyph begins.
+    /// Place at which the next glyph begins.
     start: f64,
     all: Vec<Vec<(f64, f64)>>,
 }

@@ -38,7 +38,7 @@ pub(super) struct Axis {
     pub(super) logarithmic: bool,
 }
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
     /// Points joined by a line.
@@ -86,7 +86,7 @@ impl Axis {
         Axis { label: label.to_owned(), limits, logarithmic: true }
     }
 
-    /// What values are divided by to be plotted: kuva takes all below 1e-10 for that on a logarithmic axis.
+    /// Divisor of values before plotting: kuva takes all below 1e-10 for that on a logarithmic axis.
     fn unit(&self) -> f64 {
         let decade = 10f64.powf(self.limits.0.log10().floor());
         if self.logarithmic && decade < 1e-9 { decade } else { 1.0 }

@@ -256,10 +256,7 @@ impl Drawing<'_> {
         let values = || series.iter().flat_map(|s| &s.points);
         let chart = Chart {
             title: "Cost of an accepted draw against the probability of the acceptable".to_owned(),
-            x: Axis::decades(
-                "probability that a spectrum of the model obeys the rule",
-                values().map(|p| p.0),
-            ),
+            x: Axis::decades("probability that a spectrum of the model is accepted", values().map(|p| p.0)),
             y: Axis::decades("nanoseconds for an accepted draw", values().map(|p| p.1)),
             series,
         };
@@ -367,7 +364,7 @@ impl Drawing<'_> {
         let points: Vec<_> = all.iter().map(|a| (a.lrv, 100.0 * a.share)).collect();
         let most = points.iter().map(|p| p.1).fold(1.0, f64::max);
         let chart = Chart {
-            title: "How often the rule “base” exceeds 1".to_owned(),
+            title: "How often draws under the bounds “base” exceed 1".to_owned(),
             x: Axis::linear("target luminous reflectance", (0.0, 1.0)),
             y: Axis::linear("draws that reach 1 in some band (%)", (0.0, (1.1 * most).min(105.0))),
             series: vec![Series::new("", COLOURS[0], Style::Line, points)],

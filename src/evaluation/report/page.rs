@@ -69,9 +69,9 @@ pub fn page(report: &Report, figures: &[Figure]) -> String {
     html += &randomness(report);
     html += &plots(figures, 5, None);
     html += "<h2>6. Stiff and extreme cases</h2>\n\
-             <p>Each has one right answer: values within a bound, or a refusal with the reason. The error is in parts of \
-             the largest mean and deviation of a band, or of the spectrum’s peak where there is a target, unless the \
-             result says of what.</p>";
+             <p>Each has one right answer: values within a bound, or a refusal with the reason. The error is relative to \
+             the largest mean and deviation of a band, or to the spectrum’s peak where there is a target, unless the \
+             result says otherwise.</p>";
     html += &stress(report);
     html += "</body></html>\n";
     html
@@ -155,7 +155,7 @@ fn merits(report: &Report, model: &ModelReport) -> String {
              made. Half of it is half the time for the same error.",
             grouped(draws)
         ),
-        &["engine", "first draw (s)", "ns a draw", "slope", "error² × time (s)", "in parts of the best"],
+        &["engine", "first draw (s)", "ns a draw", "slope", "error² × time (s)", "relative to the best"],
         1,
         rows,
     )

@@ -35,7 +35,7 @@ mod class {
 pub(super) struct Mat<W> {
     to: W,
     fields: Vec<Field>,
-    /// Where the next bytes of each field go.
+    /// Offsets of the next bytes of each field.
     next: Vec<u64>,
 }
 
