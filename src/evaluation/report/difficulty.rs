@@ -60,7 +60,7 @@ pub struct Task {
     pub draws: u64,
     /// Whether candidates came from a cover.
     pub covered: bool,
-    /// The probability that a spectrum of the model obeys the rule.
+    /// The probability that a spectrum of the model is accepted.
     pub probability: f64,
     /// The share of candidates that were accepted.
     pub acceptance: f64,
