@@ -255,7 +255,7 @@ impl Drawing<'_> {
         ));
         let values = || series.iter().flat_map(|s| &s.points);
         let chart = Chart {
-            title: "Cost of an accepted draw against the probability of the acceptable".to_owned(),
+            title: "Cost of an accepted draw against the probability of acceptance".to_owned(),
             x: Axis::decades("probability that a spectrum of the model is accepted", values().map(|p| p.0)),
             y: Axis::decades("nanoseconds for an accepted draw", values().map(|p| p.1)),
             series,
