@@ -245,7 +245,7 @@ fn scenes_are_drawn_planned_and_pictured() {
         ("mine.toml --preview a.png", 1, "exists already"),
         ("mine.toml -o x.npy", 2, "choose one with --arrays"),
         ("mine.toml --dry-run -o x.npy", 2, "choose one with --arrays"),
-        ("mine.toml --format spd -o x/", 2, "choose one group's spectra with --arrays"),
+        ("mine.toml --arrays target_lrv --format spd -o x/", 2, "choose the spectra of one group or more"),
         (
             "mine.toml --arrays light -o x.npy",
             2,
@@ -290,11 +290,13 @@ fn arrays_of_scenes_are_written_alone() {
     assert_eq!(shape, [2, 3, 31]);
     assert_eq!(npy(&path("background.npy")).0, [2, 999, 31]);
 
-    // Numbered from 1, those of the scenes before counted: scene 3 begins with the tenth.
-    let names: Vec<_> = (10..16).map(|number| format!("illuminance_{number:03}.spd")).collect();
-    assert_eq!(files(&path("lights")), names);
+    // Numbered from 1 in each scene.
+    let numbers = [3, 4].into_iter().flat_map(|scene| (1..=3).map(move |number| (scene, number)));
+    let names: Vec<_> =
+        numbers.map(|(scene, number)| format!("scene-{scene:04}-illuminance_{number:03}.spd")).collect();
+    assert_eq!(files(&path("lights/lights")), names);
     for (name, light) in names.iter().zip(lights.chunks(31)) {
-        let text = fs::read_to_string(path("lights").join(name)).unwrap();
+        let text = fs::read_to_string(path("lights/lights").join(name)).unwrap();
         let values: Vec<f32> =
             text.lines().map(|line| line.split(' ').nth(1).unwrap().parse().unwrap()).collect();
         assert_eq!(values, light);
