@@ -19,8 +19,8 @@ pub enum BuiltinTable {
     /// nm.
     Vrhel,
     /// 2,600 daylights measured at Granada by Hernández-Andrés et al. (2001): spectral irradiance in W m^-2 nm^-1, 300
-    /// to 1100 nm by 5 nm. Each is a combination of 80 principal components, within 10^-3 of the mean power of
-    /// what was measured; `data/README.md` says what that does to fits.
+    /// to 1100 nm by 5 nm. Each is a combination of 80 principal components, which differs from what was
+    /// measured by 10^-3 of its mean power (root mean square); `data/README.md` says what that does to fits.
     Granada,
     /// CIE standard illuminant D65: relative power, 380 to 780 nm by 5 nm.
     D65,
