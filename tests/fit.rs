@@ -172,7 +172,7 @@ fn what_cannot_be_fitted_says_why() {
 
 #[test]
 fn model_files_keep_every_bit() {
-    for name in Model::BUILTIN {
+    for &name in Model::BUILTIN {
         let model = Model::builtin(name).expect("it is built in");
         let read = Model::from_json(name, &model.to_json()).expect("it was just written");
         assert_eq!(read, model);

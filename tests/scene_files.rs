@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use spectroll::Model;
 use spectroll::scene::{PRESETS, Scene};
 
 /// A file of one group of each kind, with lines replaced: `key` of the group `table` (or of the scene, where that is
@@ -47,6 +48,8 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
     let write =
         |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("it is written");
     write("broken.json", "{ \"schema\": 1 ");
+    let fine = Model::builtin("munsell-vrhel-5nm").expect("it is built in");
+    write("fine.json", &fine.to_json());
     write("two.csv", "380,1,2\n540,1,2\n780,1,2\n");
     write("short.csv", "500,1\n540,2\n600,3\n");
     let coarse = Scene::parse("ok.toml", &file("", "seed", ""), folder.path());
@@ -69,8 +72,14 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
         (
             "",
             "wavelengths",
-            "wavelengths = \"400:5:700\"",
-            &["line 6, model of \"lights\"", "400:10:700", "set wavelengths = "],
+            "wavelengths = \"380:5:780\"",
+            &["line 10, model of \"background\"", "400 to 700 nm", "380:5:780", "choose one within it"],
+        ),
+        (
+            "surface",
+            "model",
+            "model = \"fine.json\"",
+            &["line 10, model of \"background\"", "400:5:700", "set wavelengths = "],
         ),
         ("illuminant", "name", "", &["line 4, name", "missing", "name = "]),
         ("illuminant", "name", "name = \"\"", &["line 5, name", "letters, digits"]),

@@ -27,6 +27,11 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
         of_output(error)
     } else if let Some(error) = error.downcast_ref::<ExportError>() {
         of_export(error)
+    } else if matches!(
+        error.downcast_ref(),
+        Some(ModelError::BuiltinRange { .. } | ModelError::BuiltinFit { .. })
+    ) {
+        2 // nothing that was read is wrong: the grid was asked for
     } else if error.is::<DatasetError>() || error.is::<FitError>() || error.is::<ModelError>() {
         4
     } else if error.is::<Unverified>() {

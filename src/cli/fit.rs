@@ -13,11 +13,11 @@ use super::parse::grouped;
 ///
 /// Files are MATLAB's (a matrix X of spectra in columns, and S_X = [start step count] or a vector wavelength beside it;
 /// FILE.mat:X picks one of several), .h5 (the same, spectra in rows), CSV (wavelengths in the first column, a spectrum
-/// in each other one) or .npy (spectra in rows, at --wavelengths). The names munsell and vrhel stand for built-in
-/// tables. Several are fitted together.
+/// in each other one) or .npy (spectra in rows, at --wavelengths). The names munsell, vrhel and granada stand for
+/// built-in tables. Several are fitted together.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Files of spectra, or munsell, vrhel
+    /// Files of spectra, or munsell, vrhel, granada
     #[arg(required = true, value_name = "FILE")]
     files: Vec<String>,
     /// The number of components

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use spectroll::{CoverSize, Model, Normalization, Recipe, RecipeError};
+use spectroll::{CoverSize, Grid, Model, Normalization, Recipe, RecipeError};
 
 use super::options::RecipeArguments;
 use super::parse::grouped;
@@ -20,6 +20,10 @@ pub(crate) struct Arguments {
     /// The model: a file, or the name of a built-in one
     #[arg(value_name = "MODEL")]
     pub(crate) model: String,
+
+    /// The wavelengths of a built-in model, in nm, at which it is fitted [default: those of its name]
+    #[arg(long, value_name = "START:STEP:STOP")]
+    wavelengths: Option<Grid>,
 
     /// Draw the model into this file, .svg, .png or .pdf
     #[arg(short, long, value_name = "PATH")]
@@ -43,7 +47,7 @@ pub(crate) struct Arguments {
 /// Prints the table, after making the picture where one is asked for.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
-    let model = super::model(&arguments.model)?;
+    let model = super::model_at(&arguments.model, arguments.wavelengths)?;
     let recipe = arguments.request.recipe(&model);
     if let (Some(path), Some(format)) = (&arguments.output, format) {
         let figure = picture::model::Picture {
@@ -210,7 +214,7 @@ mod tests {
 
     #[test]
     fn the_table_fits_80_columns_and_has_a_row_a_component() {
-        for name in Model::BUILTIN {
+        for &name in Model::BUILTIN {
             let model = Model::builtin(name).unwrap();
             let table = table(name, &model, &Recipe::builder(&model).build());
             assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");

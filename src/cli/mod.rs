@@ -16,6 +16,7 @@ mod exit;
 mod fit;
 mod inspect;
 mod interrupt;
+mod models;
 mod options;
 mod packaging;
 mod parse;
@@ -31,8 +32,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use spectroll::Model;
 use spectroll::output::IfExists;
+use spectroll::{Grid, Model};
 
 use exit::Usage;
 
@@ -71,6 +72,8 @@ enum Command {
     Verify(verify::VerifyArguments),
     Merge(verify::MergeArguments),
     Inspect(inspect::Arguments),
+    #[command(alias = "list")]
+    Models(models::Arguments),
     Shader(shader::Arguments),
     Adapters(adapters::Arguments),
     Bench(bench::Arguments),
@@ -102,6 +105,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Verify(arguments) => verify::run(arguments),
         Command::Merge(arguments) => verify::join(arguments),
         Command::Inspect(arguments) => inspect::run(arguments),
+        Command::Models(arguments) => models::run(arguments),
         Command::Shader(arguments) => shader::run(arguments),
         Command::Adapters(arguments) => adapters::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
@@ -123,6 +127,17 @@ fn model(name: &str) -> anyhow::Result<Model> {
         )));
     }
     Ok(Model::load(Path::new(name))?)
+}
+
+/// The same, where a built-in model may be asked for at other wavelengths than its own.
+fn model_at(name: &str, wavelengths: Option<Grid>) -> anyhow::Result<Model> {
+    match wavelengths {
+        Some(grid) if Model::BUILTIN.contains(&name) => Ok(Model::builtin_at(name, grid)?),
+        Some(grid) if Path::new(name).exists() => anyhow::bail!(Usage(format!(
+            "--wavelengths {grid}: the grid belongs to the model {name:?}: fit it with spectroll fit --wavelengths"
+        ))),
+        _ => model(name),
+    }
 }
 
 /// The folder that a path names something in.

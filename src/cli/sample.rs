@@ -7,13 +7,13 @@ use std::time::Instant;
 use serde::Serialize;
 use spectroll::export::{DrawExport, Writing};
 use spectroll::output::SetStatus;
-use spectroll::{DrawRange, DrawSummary, EngineChoice, Stream};
+use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Stream};
 
 use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, RecipeArguments};
 use super::parse::{count, grouped};
 use super::run::{self, DryRun, folder_of};
-use super::{interrupt, model};
+use super::{interrupt, model_at};
 
 /// Draw spectra from a model
 ///
@@ -24,6 +24,9 @@ pub(crate) struct Arguments {
     /// A model file, or munsell-vrhel, granada, munsell-vrhel-5nm, granada-5nm
     #[arg(value_name = "MODEL")]
     model: String,
+    /// The wavelengths of a built-in model, in nm, at which it is fitted [default: those of its name]
+    #[arg(long, value_name = "START:STEP:STOP")]
+    wavelengths: Option<Grid>,
     /// Number of spectra (1000000 and 1e6 are the same)
     #[arg(short = 'n', long, value_name = "COUNT", value_parser = count, allow_negative_numbers = true)]
     count: u64,
@@ -78,7 +81,7 @@ struct Report {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = arguments.output.resolve()?;
-    let model = model(&arguments.model)?;
+    let model = model_at(&arguments.model, arguments.wavelengths)?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
     let stream = match &arguments.stream {

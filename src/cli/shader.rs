@@ -2,7 +2,9 @@
 
 use std::io::Write;
 
-use super::model;
+use spectroll::Grid;
+
+use super::model_at;
 use super::options::RecipeArguments;
 
 /// Print WGSL functions that draw spectra, for a shader of your own
@@ -16,6 +18,9 @@ pub(crate) struct Arguments {
     /// A model file or the name of a built-in model
     #[arg(value_name = "MODEL")]
     model: String,
+    /// The wavelengths of a built-in model, in nm, at which it is fitted [default: those of its name]
+    #[arg(long, value_name = "START:STEP:STOP")]
+    wavelengths: Option<Grid>,
     #[command(flatten)]
     request: RecipeArguments,
     /// Begin every name with this
@@ -27,7 +32,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let model = model(&arguments.model)?;
+    let model = model_at(&arguments.model, arguments.wavelengths)?;
     let recipe = arguments.request.recipe(&model)?;
     let text = recipe.wgsl(&arguments.prefix)?;
     let mut out = std::io::stdout().lock();

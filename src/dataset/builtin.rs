@@ -1,17 +1,27 @@
-//! Compiled-in tables: unmodified files of the Psychophysics Toolbox, see `data/README.md`.
+//! Compiled-in tables: unmodified files of the Psychophysics Toolbox, and a compact form of measured daylights; see
+//! `data/README.md`.
 
 use std::path::Path;
 
-use super::{Table, mat};
+use nalgebra::DMatrix;
+
+use super::matrix::Matrix;
+use super::{SpectrumKind, Table, mat};
+use crate::grid::Grid;
 
 /// Name of a table that is compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BuiltinTable {
     /// 462 Munsell papers measured by Nickerson: reflectance, 400 to 700 nm by 5 nm.
     Munsell,
     /// 170 natural and man-made surfaces measured by Vrhel, Gershon & Iwan (1994): reflectance, 390 to 730 nm by 2
     /// nm.
     Vrhel,
+    /// 2,600 daylights measured at Granada by Hernández-Andrés et al. (2001): spectral irradiance in W m^-2 nm^-1, 300
+    /// to 1100 nm by 5 nm. Each is a combination of 80 principal components, which differs from what was
+    /// measured by 10^-3 of its mean power (root mean square); `data/README.md` says what that does to fits.
+    Granada,
     /// CIE standard illuminant D65: relative power, 380 to 780 nm by 5 nm.
     D65,
     /// CIE 1931 colour matching functions x, y, z: 360 to 830 nm by 1 nm.
@@ -22,9 +32,10 @@ pub enum BuiltinTable {
 
 impl BuiltinTable {
     /// Every table.
-    pub const ALL: [BuiltinTable; 5] = [
+    pub const ALL: &[BuiltinTable] = &[
         BuiltinTable::Munsell,
         BuiltinTable::Vrhel,
+        BuiltinTable::Granada,
         BuiltinTable::D65,
         BuiltinTable::Xyz1931,
         BuiltinTable::CieDaylight,
@@ -32,7 +43,7 @@ impl BuiltinTable {
 
     /// Returns the table of this [name](Self::name), if there is one.
     pub fn named(name: &str) -> Option<BuiltinTable> {
-        BuiltinTable::ALL.into_iter().find(|builtin| builtin.name() == name)
+        BuiltinTable::ALL.iter().copied().find(|table| table.name() == name)
     }
 
     /// Name of the table in commands and messages.
@@ -40,6 +51,7 @@ impl BuiltinTable {
         match self {
             BuiltinTable::Munsell => "munsell",
             BuiltinTable::Vrhel => "vrhel",
+            BuiltinTable::Granada => "granada",
             BuiltinTable::D65 => "d65",
             BuiltinTable::Xyz1931 => "xyz1931",
             BuiltinTable::CieDaylight => "cie-daylight",
@@ -51,6 +63,7 @@ impl BuiltinTable {
         let (variable, bytes): (_, &[u8]) = match self {
             BuiltinTable::Munsell => ("sur_nickerson", include_bytes!("../../data/sur_nickerson.mat")),
             BuiltinTable::Vrhel => ("sur_vrhel", include_bytes!("../../data/sur_vrhel.mat")),
+            BuiltinTable::Granada => return granada(self.name()),
             BuiltinTable::D65 => ("spd_D65", include_bytes!("../../data/spd_D65.mat")),
             BuiltinTable::Xyz1931 => ("T_xyz1931", include_bytes!("../../data/T_xyz1931.mat")),
             BuiltinTable::CieDaylight => ("B_cieday", include_bytes!("../../data/B_cieday.mat")),
@@ -65,6 +78,31 @@ impl BuiltinTable {
         }
         table
     }
+}
+
+/// The daylights, from the file that `scripts/granada.py` makes:
+/// spectrum = power * (mean + components . (step * weights)).
+fn granada(name: &str) -> Table {
+    let bytes = include_bytes!("../../data/granada_compact.mat");
+    let matrices = mat::matrices(Path::new(name), bytes).expect("compiled-in tables are readable").all;
+    let matrix = |name: &str| {
+        let Matrix { rows, columns, values, .. } =
+            matrices.iter().find(|m| m.name == name).expect("the file has every variable");
+        DMatrix::from_column_slice(*rows, *columns, values)
+    };
+    let mut spectra =
+        matrix("granada_components") * (matrix("granada_weights") * matrix("granada_weight_step")[0]);
+    let (mean, power) = (matrix("granada_mean"), matrix("granada_power"));
+    for (mut spectrum, &power) in spectra.column_iter_mut().zip(&power) {
+        spectrum += mean.column(0);
+        spectrum *= power;
+    }
+    let sampling = matrix("S_granada");
+    let grid = Grid::new(sampling[0], sampling[1], sampling[2] as usize).expect("the sampling is a grid");
+    let mut table = Table::from_columns(name, grid.wavelengths().collect(), spectra)
+        .expect("compiled-in tables are finite");
+    table.kind = Some(SpectrumKind::Illuminant);
+    table
 }
 
 impl Table {
@@ -86,6 +124,7 @@ mod tests {
         for (name, count, first, last, bands, kind) in [
             ("munsell", 462, 400.0, 700.0, 61, Some(SpectrumKind::Reflectance)),
             ("vrhel", 170, 390.0, 730.0, 171, Some(SpectrumKind::Reflectance)),
+            ("granada", 2600, 300.0, 1100.0, 161, Some(SpectrumKind::Illuminant)),
             ("d65", 1, 380.0, 780.0, 81, Some(SpectrumKind::Illuminant)),
             ("xyz1931", 3, 360.0, 830.0, 471, None),
             ("cie-daylight", 3, 380.0, 780.0, 81, None),

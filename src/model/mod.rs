@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 mod builtin;
 mod fit;
 
+pub use builtin::BuiltinData;
 pub use fit::{Fit, FitError};
 
 use crate::dataset::SpectrumKind;
@@ -106,6 +107,13 @@ pub enum ModelError {
     NotPositive { smallest: f64, largest: f64 },
     #[error("there is no built-in model {name:?}; there are {}", Model::BUILTIN.join(", "))]
     NoBuiltin { name: String },
+    #[error(
+        "{name} was measured from {first} to {last} nm, which does not cover the grid {grid}: choose one within it, or \
+         fit a model to data that cover it"
+    )]
+    BuiltinRange { name: String, first: f64, last: f64, grid: Grid },
+    #[error("{name} cannot be fitted at {grid} nm, choose a grid of more bands or a wider one: {source}")]
+    BuiltinFit { name: String, grid: Grid, source: FitError },
 }
 
 impl Model {

@@ -9,7 +9,7 @@ use toml::de::DeTable;
 
 use crate::colorimetry;
 use crate::dataset::{Dataset, DatasetError, Table};
-use crate::grid::Extrapolation;
+use crate::grid::{Extrapolation, Grid};
 use crate::model::Model;
 use crate::program::Bounds;
 use crate::quantity::Quantity;
@@ -99,7 +99,7 @@ impl Scene {
         let table = DeTable::parse(text).map_err(|e| {
             error(e.span(), None, String::new(), SceneErrorKind::Syntax(e.message().replace('\n', "; ")))
         })?;
-        let mut file = Reader { folder, models: HashMap::new() }
+        let mut file = Reader { folder, wavelengths: None, models: HashMap::new() }
             .scene(table.get_ref())
             .map_err(|wrong| error(Some(wrong.span), wrong.group, wrong.key, *wrong.problem))?;
         file.builder.seed = seed.unwrap_or(file.builder.seed);
@@ -137,6 +137,8 @@ struct Located {
 
 struct Reader<'a> {
     folder: &'a Path,
+    /// The scene's, which built-in models take.
+    wavelengths: Option<Grid>,
     /// Models that were read.
     models: HashMap<String, Model>,
 }
@@ -151,6 +153,7 @@ impl Reader<'_> {
         if let Some(entry) = section.get("wavelengths") {
             let grid = entry.text()?.parse().map_err(|e| entry.wrong(SceneErrorKind::Wavelengths(e)))?;
             builder = builder.wavelengths(grid);
+            self.wavelengths = Some(grid);
         }
         let mut groups = Vec::new();
         for (key, known) in [("illuminant", &ILLUMINANT[..]), ("surface", &SURFACE), ("target", &TARGET)] {
@@ -262,11 +265,11 @@ impl Reader<'_> {
         }
         let path = self.folder.join(name);
         let model = if Model::BUILTIN.contains(&name) {
-            Model::builtin(name)
+            self.wavelengths.map_or_else(|| Model::builtin(name), |grid| Model::builtin_at(name, grid))
         } else if path.is_file() {
             Model::load(&path)
         } else {
-            let suggestion = closest(name, Model::BUILTIN);
+            let suggestion = closest(name, Model::BUILTIN.iter().copied());
             return Err(entry.wrong(SceneErrorKind::NoModel { name: name.to_owned(), suggestion }));
         };
         let model = model.map_err(|e| entry.wrong(SceneErrorKind::Model(e)))?;
