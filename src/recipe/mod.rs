@@ -15,6 +15,8 @@ pub use settings::RecipeSettings;
 
 use std::ops::Range;
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use crate::colorimetry;
@@ -83,6 +85,15 @@ pub enum Lrv {
     /// scaled spectrum is bounded, a light target takes more candidates, and is as frequent as a dark one.
     /// [`Quantity::Lrv`](crate::Quantity::Lrv) has it. The first must be below the second; in f32, either may come out.
     Uniform(f64, f64),
+}
+
+impl fmt::Display for Lrv {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Lrv::Fixed(lrv) => lrv.fmt(f),
+            Lrv::Uniform(low, high) => write!(f, "{low}..{high}"),
+        }
+    }
 }
 
 impl From<f64> for Lrv {
