@@ -57,5 +57,5 @@ pub use recipe::{
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
 // What stands in signatures, so that hosts take the same versions.
-pub use {half, nalgebra, rand, wgpu};
 pub use wgsl::WgslError;
+pub use {half, nalgebra, rand, wgpu};
