@@ -79,11 +79,7 @@ fn a_software_adapter_draws_what_the_cpu_drew() {
 #[test]
 fn a_model_is_fitted_as_it_was() {
     let folder = tempfile::tempdir().unwrap();
-    assert_frozen(
-        folder.path(),
-        "m.json",
-        "fit munsell vrhel -k 8 --wavelengths 400:5:700 -o m.json",
-    );
+    assert_frozen(folder.path(), "m.json", "fit munsell vrhel -k 8 --wavelengths 400:5:700 -o m.json");
 }
 
 /// A sum that no run is for would look as if it were checked.
