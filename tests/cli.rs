@@ -82,9 +82,15 @@ fn summaries_tell_what_matters_first() {
     assert!(!err.contains("no graphics hardware"), "{err}");
 
     let text = succeeds(folder.path(), "scene --example condition3").0;
-    fs::write(folder.path().join("s.toml"), text.replace("bounds = \"both\"", "bounds = \"base\"")).unwrap();
+    fs::write(folder.path().join("s.toml"), text.replace("bounds = \"scaled\"", "bounds = \"base\""))
+        .unwrap();
     let (_, err) = succeeds(folder.path(), "scene s.toml --scenes 0..1 --engine cpu -o s.npz");
     assert!(err.starts_with("s.npz: 1 scene of 31 bands\n"), "{err}");
+    let (_, err) = succeeds(folder.path(), "scene s.toml --only target --engine cpu -o t.npz");
+    assert!(
+        err.contains(" %) reach 1 or more after scaling: use bounds = \"both\" to keep all below 1"),
+        "{err}"
+    );
 }
 
 /// A seed that nobody chose can be used again.
@@ -144,7 +150,7 @@ fn only_readers_may_go_away() {
 fn what_does_not_fit_is_refused_before_it_is_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let text = succeeds(folder.path(), "scene --example condition3").0;
-    fs::write(folder.path().join("s.toml"), text.replace("scenes = 1000", "scenes = 1000000000000")).unwrap();
+    fs::write(folder.path().join("s.toml"), text.replace("scenes = 3000", "scenes = 1000000000000")).unwrap();
     for run in [
         "sample munsell-vrhel -n 1000T -o a.npy",
         "sample munsell-vrhel -n 1000T -o a.csv",
