@@ -6,7 +6,7 @@ use std::fs;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use program::{PROGRAM, fails, files, npy, succeeds};
+use program::{PROGRAM, fails, files, npy, spectroll, succeeds};
 
 #[test]
 fn a_sample_is_the_same_from_every_engine_and_in_every_format() {
@@ -56,6 +56,135 @@ fn the_summary_says_what_was_made() {
     assert_eq!((json["draws"].as_u64(), json["bands"].as_u64(), err.as_str()), (Some(1000), Some(31), ""));
     let (out, err) = succeeds(folder.path(), "sample granada -n 10 -q -o c.npy");
     assert_eq!((out, err), (String::new(), String::new()));
+}
+
+/// What exceeds 1 stands in the first line, since it matters most, with what to do about it.
+#[test]
+fn summaries_tell_what_matters_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = |arguments: &str| {
+        let (_, err) = succeeds(folder.path(), &format!("sample {arguments} --engine cpu"));
+        err.lines().next().unwrap().to_owned()
+    };
+    let line = first("munsell-vrhel -n 10k --lrv 0.6 -o a.npy");
+    assert!(line.starts_with("a.npy: 10,000 spectra of 31 bands; "), "{line}");
+    assert!(
+        line.ends_with(" %) reach 1 or more after scaling: use --bounds both to keep all below 1"),
+        "{line}"
+    );
+    assert_eq!(
+        first("munsell-vrhel -n 10k --lrv 0.6 --bounds both -o b.npy"),
+        "b.npy: 10,000 spectra of 31 bands"
+    );
+    assert_eq!(first("granada -n 1 -o c.npy"), "c.npy: 1 spectrum of 31 bands");
+    assert_eq!(first("granada -n 2 --format npy -o parts"), "parts: one file, 2 spectra of 31 bands");
+    let (_, err) = succeeds(folder.path(), "sample granada -n 1 -o d.npy");
+    assert!(!err.contains("no graphics hardware"), "{err}");
+
+    let text = succeeds(folder.path(), "scene --example condition3").0;
+    fs::write(folder.path().join("s.toml"), text.replace("bounds = \"scaled\"", "bounds = \"base\""))
+        .unwrap();
+    let (_, err) = succeeds(folder.path(), "scene s.toml --scenes 0..1 --engine cpu -o s.npz");
+    assert!(err.starts_with("s.npz: 1 scene of 31 bands\n"), "{err}");
+    let (_, err) = succeeds(folder.path(), "scene s.toml --only target --engine cpu -o t.npz");
+    assert!(
+        err.contains(" %) reach 1 or more after scaling: use bounds = \"both\" to keep all below 1"),
+        "{err}"
+    );
+}
+
+/// A seed that nobody chose can be used again.
+#[test]
+fn random_seeds_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let random = "sample granada -n 5 --engine cpu --seed random -o";
+    let (json, _) = succeeds(folder.path(), &format!("{random} a.npz --json"));
+    let seed = serde_json::from_str::<serde_json::Value>(&json).unwrap()["seed"].as_u64().unwrap();
+    succeeds(folder.path(), &format!("sample granada -n 5 --engine cpu --seed {seed} -o b.npz"));
+    let [a, b] = ["a.npz", "b.npz"].map(|name| fs::read(folder.path().join(name)).unwrap());
+    assert!(a == b, "draws and attributes are those of seed {seed}");
+    let (_, summary) = succeeds(folder.path(), &format!("{random} c.npy"));
+    let told: u64 = summary.split("seed ").nth(1).unwrap().lines().next().unwrap().parse().unwrap();
+    assert_ne!(told, seed);
+    fails(folder.path(), "sample granada -n 5 --seed -1 -o x.npy", 2, "from 0 to 2^64 - 1, or random");
+}
+
+#[test]
+fn npy_is_streamed() {
+    let folder = tempfile::tempdir().unwrap();
+    let sample = "sample munsell-vrhel -n 100k --engine cpu --seed 2";
+    let streamed = spectroll(folder.path(), &format!("{sample} --format npy -o -"));
+    assert!(streamed.status.success());
+    succeeds(folder.path(), &format!("{sample} -o a.npy"));
+    assert!(streamed.stdout == fs::read(folder.path().join("a.npy")).unwrap());
+    let scene = "scene --example condition2 --scenes 0..5 --engine cpu --arrays lights";
+    let streamed = spectroll(folder.path(), &format!("{scene} --format npy -o -"));
+    succeeds(folder.path(), &format!("{scene} -o b.npy"));
+    assert!(streamed.stdout == fs::read(folder.path().join("b.npy")).unwrap());
+    let several = "sample granada -n 5 --quantities spectra,xyz --format npy -o -";
+    fails(folder.path(), several, 2, "choose one quantity");
+}
+
+/// A reader that has what it wants ends a run well, and a full device does not.
+#[cfg(target_os = "linux")]
+#[test]
+fn only_readers_may_go_away() {
+    let folder = tempfile::tempdir().unwrap();
+    for format in ["csv", "npy"] {
+        let shell = |to: &str| {
+            let script = format!(
+                "set -o pipefail; {PROGRAM} sample granada -n 1e6 --engine cpu -q --format {format} -o - {to}"
+            );
+            Command::new("bash").args(["-c", &script]).current_dir(folder.path()).output().unwrap()
+        };
+        let output = shell("| head -c 100 > /dev/null");
+        assert!(output.status.success() && output.stderr.is_empty(), "{format}: {output:?}");
+        let output = shell("> /dev/full");
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(1) && err.contains("cannot write to standard output"), "{err}");
+    }
+}
+
+/// Whatever the disk: nobody has so much.
+#[test]
+fn what_does_not_fit_is_refused_before_it_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = succeeds(folder.path(), "scene --example condition3").0;
+    fs::write(folder.path().join("s.toml"), text.replace("scenes = 3000", "scenes = 1000000000000")).unwrap();
+    for run in [
+        "sample munsell-vrhel -n 1000T -o a.npy",
+        "sample munsell-vrhel -n 1000T -o a.csv",
+        "sample munsell-vrhel -n 1000T -o a.zarr",
+        "sample munsell-vrhel -n 1000T --zstd -o a.zarr",
+        "sample munsell-vrhel -n 1000T --shard 3/8 -o a.zarr",
+        "scene s.toml -o a.zarr",
+        "scene s.toml --format parquet -o a/",
+    ] {
+        let run = format!("{run} --engine cpu");
+        fails(folder.path(), &run, 1, "B are free here (--force-space overrides)");
+        let output = spectroll(folder.path(), &format!("{run} --dry-run"));
+        let table = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{run}: {table}");
+        assert!(table.contains("which is not enough"), "{run}: {table}");
+        let forced = spectroll(folder.path(), &format!("{run} --dry-run --force-space"));
+        assert!(forced.status.success(), "{run}");
+    }
+    fails(folder.path(), "sample munsell-vrhel -n 1000T -o a.npy --engine cpu", 1, "a.npy needs 124 PB and ");
+    let packed = "sample munsell-vrhel -n 1000T --zstd -o a.zarr --engine cpu";
+    fails(folder.path(), packed, 1, "a.zarr needs at least 31 PB and ");
+}
+
+/// Only the name that a file gets in the end may be too long.
+#[cfg(unix)]
+#[test]
+fn names_that_are_too_long_are_refused_before_anything_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = "n".repeat(252);
+    for output in [format!("{name}.npy"), format!("{name}.zarr")] {
+        let start = Instant::now();
+        fails(folder.path(), &format!("sample granada -n 1e8 --engine cpu -o {output}"), 1, "too long");
+        assert!(start.elapsed() < Duration::from_secs(20), "it was drawn first");
+    }
 }
 
 #[test]
@@ -112,7 +241,10 @@ fn what_is_in_the_way_of_a_file_stays() {
     fails(folder.path(), "sample granada -n 5 -o x.xlsx", 2, "name it .npy, .npz, .csv");
     let several = "sample granada -n 5 --quantities spectra,xyz -o x.npy";
     fails(folder.path(), several, 2, "choose one with --quantities");
-    fails(folder.path(), "sample granada -n 5 --format npy -o -", 2, "standard output takes CSV only");
+    for format in ["parquet", "zarr", "spd", "h5"] {
+        let run = format!("sample granada -n 5 --format {format} -o -");
+        fails(folder.path(), &run, 2, "standard output takes CSV and .npy alone");
+    }
     fails(folder.path(), "sample granada -n 5 -o - --json", 2, "both write to standard output");
     fails(folder.path(), "sample granada -n 5 --force --format npy -o /dev/null", 1, "not a plain file");
     assert_eq!(fs::read_to_string(folder.path().join("old.npy")).unwrap(), "mine");

@@ -33,7 +33,7 @@ fn npz() {
                 import json, zipfile\n\
                 assert zipfile.ZipFile('b.npz').testzip() is None\n\
                 assert json.loads(str(f['attributes']))['seed'] == 3";
-    equals(folder.path(), load, "f['spectra']", "f['wavelengths']");
+    equals(folder.path(), load, "f['spectra']", "f['wavelength']");
 }
 
 /// Rounded to 1 a reflectance would not be one any more; 1.7 % of these spectra have such a value.
@@ -47,6 +47,37 @@ fn sixteen_bits_keep_spectra_physical() {
     assert_eq!(python(folder.path(), "import numpy as np; print((np.load('b.npy') > 0).all())"), "True");
     let bright = "sample granada -n 1000 --intensity 1e4..1e6 --dtype f16 -o c.npy";
     fails(folder.path(), bright, 1, "do not fit float16, which ends at 65504: use float32");
+}
+
+/// An LRV of 0.4 in half precision is 0.39990; labels are few, and are exact.
+#[test]
+fn labels_beside_half_spectra_are_float32() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let sample =
+        "sample munsell-vrhel -n 50 --lrv 0.4 --quantities spectra,weights,xyz,lrv,attempts --engine cpu";
+    let scene = "scene --example condition3 --scenes 0..4 --engine cpu";
+    for (dtype, expected) in [
+        (
+            "f16",
+            "{'spectra': 'float16', 'weights': 'float32', 'xyz': 'float32', 'lrv': 'float32', 'attempts': 'uint32'}",
+        ),
+        (
+            "f64",
+            "{'spectra': 'float64', 'weights': 'float64', 'xyz': 'float64', 'lrv': 'float64', 'attempts': 'uint32'}",
+        ),
+    ] {
+        succeeds(folder, &format!("{sample} --dtype {dtype} -o a.npz --force"));
+        let code = "import numpy as np; f = np.load('a.npz')\n\
+                    names = ['spectra', 'weights', 'xyz', 'lrv', 'attempts']\n\
+                    assert (f['lrv'] == np.float32(0.4)).all()\n\
+                    print({name: str(f[name].dtype) for name in names})";
+        assert_eq!(python(folder, code), expected, "{dtype}");
+    }
+    succeeds(folder, &format!("{scene} --dtype f16 -o s.npz"));
+    let code = "import numpy as np; f = np.load('s.npz')\n\
+                print([str(f[name].dtype) for name in ['lights', 'lights_intensity', 'target', 'target_lrv']])";
+    assert_eq!(python(folder, code), "['float16', 'float32', 'float16', 'float32']");
 }
 
 /// Not the words that engines hold them in, which also say whether a value reached 1.
@@ -100,7 +131,7 @@ fn parquet() {
                 assert json.loads(meta[b'spectroll'])['seed'] == 3\n\
                 column = t['spectra'].combine_chunks()";
     let flat = "column.flatten().to_numpy(zero_copy_only=False).reshape(-1, 31)";
-    equals(folder.path(), load, flat, "json.loads(meta[b'wavelengths'])");
+    equals(folder.path(), load, flat, "json.loads(meta[b'wavelength'])");
 }
 
 #[test]
@@ -124,13 +155,13 @@ fn folders_of_parts() {
     beside(folder.path(), "b/ --format npy --chunk 300");
     let load = "import glob; parts = [np.load(p) for p in sorted(glob.glob('b/spectra-*.npy'))]\n\
                 assert [len(p) for p in parts] == [300, 300, 300, 100]";
-    equals(folder.path(), load, "np.concatenate(parts)", "np.load('b/wavelengths.npy')");
+    equals(folder.path(), load, "np.concatenate(parts)", "np.load('b/wavelength.npy')");
     beside(folder.path(), "c/ --format parquet --chunk 300");
     let load = "import json, glob, pyarrow.parquet as pq\n\
                 t = pq.read_table(sorted(glob.glob('c/*.parquet')))\n\
                 column = t['spectra'].combine_chunks()";
     let flat = "column.flatten().to_numpy(zero_copy_only=False).reshape(-1, 31)";
-    equals(folder.path(), load, flat, "json.loads(t.schema.metadata[b'wavelengths'])");
+    equals(folder.path(), load, flat, "json.loads(t.schema.metadata[b'wavelength'])");
 }
 
 #[test]
@@ -181,7 +212,7 @@ fn spd_folders_are_named_as_the_authors_named_theirs() {
     assert_eq!(files(&folder.join("target")), ["luminance-0.4000-reflectance-001.spd"]);
     succeeds(folder, "sample munsell-vrhel -n 2 --lrv 0.2..0.6 --format spd -o each/");
     assert_eq!(files(&folder.join("each")), ["reflectance_001.spd", "reflectance_002.spd"]);
-    fails(folder, "sample granada -n 10001 --format spd -o many/", 1, "pass --force");
+    fails(folder, "sample granada -n 10001 --format spd -o many/", 1, "(--force does)");
     fails(folder, "sample granada -n 1 --format spd -o light/", 1, "exists already");
 }
 

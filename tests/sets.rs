@@ -85,7 +85,7 @@ fn an_interrupt_keeps_what_is_finished() {
     let err = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{err}");
     assert!(err.contains("chunks are finished in \"a.zarr.partial\": pass --resume to go on"), "{err}");
-    fails(folder.path(), run, 1, "pass --resume to go on with it, or --force");
+    fails(folder.path(), run, 1, "resume it, or replace it (--resume or --force)");
 }
 
 #[test]
@@ -113,6 +113,34 @@ fn shards_at_once_make_the_bytes_of_one_process() {
     assert!(command.current_dir(folder.path()).output().unwrap().status.success());
     assert!(tree(folder.path()) == tree(whole.path()));
     fails(folder.path(), &format!("{run} --shard 1/2"), 1, "exists already");
+}
+
+/// A plan is made where nothing says yet which part will be asked for, and names the part where something does.
+#[test]
+fn dry_runs_and_summaries_name_the_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let run = "sample munsell-vrhel -n 10000 --chunk 1000 --engine cpu -o a.zarr";
+    let (plan, _) = succeeds(folder, &format!("{run} --shard auto --dry-run"));
+    assert!(plan.contains("1.24 MB in 10 chunks of 1,000 draws") && !plan.contains("part"), "{plan}");
+    let (plan, _) = succeeds(folder, &format!("{run} --shard 2/3 --dry-run"));
+    assert!(plan.contains("part 2 of 3, chunks 3 to 5: 372 kB"), "{plan}");
+    let mut command = Command::new(PROGRAM);
+    command.args(format!("{run} --shard auto/10 --dry-run").split_whitespace());
+    let output = command.env("JOB_COMPLETION_INDEX", "9").current_dir(folder).output().unwrap();
+    let plan = String::from_utf8(output.stdout).unwrap();
+    assert!(plan.contains("part 10 of 10, chunk 9: 124 kB"), "{plan}");
+    let (plan, _) =
+        succeeds(folder, "scene --example condition2 --chunk 100 -o s.zarr --shard 2/4 --dry-run");
+    assert!(plan.contains("part 2 of 4, chunks 2 to 4"), "{plan}");
+    assert!(files(folder).is_empty());
+
+    let (_, first) = succeeds(folder, &format!("{run} --shard 1/2"));
+    assert!(first.contains("5 of 10 chunks are finished: the set gets its name with the last"), "{first}");
+    let (_, last) = succeeds(folder, &format!("{run} --shard 2/2"));
+    assert!(last.contains("the set is complete"), "{last}");
+    let (_, alone) = succeeds(folder, &run.replace("a.zarr", "b.zarr"));
+    assert!(!alone.contains("complete"), "{alone}");
 }
 
 #[test]
@@ -191,7 +219,7 @@ fn forge(set: &Path, name: &str) {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(&path, &bytes).unwrap();
-    let manifest = set.join("manifest.json");
+    let manifest = set.join("_manifest.json");
     let text = fs::read_to_string(&manifest).unwrap();
     fs::write(&manifest, text.replace(&before, blake3::hash(&bytes).to_hex().as_str())).unwrap();
 }
@@ -253,6 +281,13 @@ fn scenes_of_models_that_are_not_at_hand_have_their_sums_checked() {
     assert!(err.contains("the model or the mean of \"wall\" in \"files\" is not that of the set"), "{err}");
 }
 
+/// The bytes that a run would write.
+#[cfg(target_os = "linux")]
+fn size_of_rest(folder: &Path, run: &str) -> u64 {
+    let (json, _) = succeeds(folder, &format!("{run} --dry-run --json"));
+    serde_json::from_str::<serde_json::Value>(&json).unwrap()["bytes"].as_u64().unwrap()
+}
+
 /// A disk of 3 MB. Where no file system may be mounted, there is nothing to see.
 #[cfg(target_os = "linux")]
 #[test]
@@ -270,6 +305,9 @@ fn a_full_disk_keeps_what_was_finished() {
         return;
     }
     let sample = "sample munsell-vrhel -n 100000 --engine cpu";
+    fails(&disk, &format!("{sample} -o a.npy"), 1, "a.npy needs 12.4 MB and 3");
+    fails(&disk, &format!("{sample} -o a.npy"), 1, "MB are free here (--force-space overrides)");
+    let sample = &format!("{sample} --force-space");
     for format in ["npy", "npz", "csv", "h5", "mat", "parquet"] {
         fails(&disk, &format!("{sample} -o a.{format}"), 1, "No space left on device");
     }
@@ -279,8 +317,12 @@ fn a_full_disk_keeps_what_was_finished() {
     assert!(output.status.code() == Some(1) && err.contains("No space left on device"), "{err}");
     assert!(err.contains("pass --resume"), "{err}");
     assert_eq!(files(&disk), ["a.zarr.partial"]);
+    // What is finished is not asked room for again.
+    let (done, whole) = (size_of_rest(&disk, &format!("{set} --resume")), 12_400_000);
+    assert!((1..whole).contains(&done), "{done} of {whole}");
     assert!(mount("30m", "remount,"));
     succeeds(&disk, &format!("{set} --resume"));
+    assert_eq!(size_of_rest(&disk, &format!("{set} --resume")), 0);
     succeeds(&disk, "verify a.zarr --redraw 0.05");
     assert!(Command::new("umount").arg(&disk).status().unwrap().success());
 }
@@ -310,6 +352,9 @@ fn what_is_in_the_way_is_named() {
     assert_eq!(files(folder), ["file.zarr", "mine.zarr"]);
     succeeds(folder, &format!("{sample} -o empty.zarr").replace("-n 5", "-n 0"));
     succeeds(folder, "verify empty.zarr");
+    // No chunk is longer than the set.
+    let (out, _) = succeeds(folder, &format!("{sample} -o a.zarr --chunk 1e18 --dry-run"));
+    assert!(out.contains("in 1 chunk of 5 draws"), "{out}");
 }
 
 #[test]

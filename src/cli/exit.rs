@@ -56,9 +56,9 @@ fn of_engine(error: &EngineError) -> u8 {
 }
 
 fn of_output(error: &OutputError) -> u8 {
-    use OutputError::{Cannot, Damaged, NotBuilt, UnknownFormat};
+    use OutputError::{Cannot, Damaged, NotBuilt, NotStreamed, UnknownFormat};
     match error {
-        UnknownFormat { .. } | Cannot { .. } | NotBuilt { .. } => 2,
+        UnknownFormat { .. } | Cannot { .. } | NotBuilt { .. } | NotStreamed => 2,
         Damaged { .. } => 5,
         _ => 1,
     }
@@ -88,6 +88,8 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             | OutputError::ManyFiles { .. }
             | OutputError::Damaged { .. } => " (--force does)",
             OutputError::Unfinished { .. } => " (--resume or --force)",
+            OutputError::NoSpace { .. } => " (--force-space overrides)",
+            OutputError::NotStreamed => " (--format csv or npy)",
             OutputError::Cannot { holds: "one array" | "spectra", .. } => {
                 " (--quantities, or --arrays for scenes)"
             }
@@ -107,6 +109,28 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
 
 /// Whether whoever read standard output has what it wanted and went away.
 pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    let broken = |e: &std::io::Error| e.kind() == std::io::ErrorKind::BrokenPipe;
-    error.chain().any(|cause| cause.downcast_ref().is_some_and(broken))
+    // Not any cause: whatever becomes of a file is an error.
+    let stdout = error.downcast_ref::<std::io::Error>().or(match error.downcast_ref::<ExportError>() {
+        Some(ExportError::Stdout(error)) => Some(error),
+        _ => None,
+    });
+    stdout.is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Error, ErrorKind};
+    use std::path::PathBuf;
+
+    use super::*;
+
+    #[test]
+    fn only_the_reader_of_standard_output_may_go_away() {
+        let broken = || Error::from(ErrorKind::BrokenPipe);
+        assert!(is_broken_pipe(&broken().into()));
+        assert!(is_broken_pipe(&ExportError::Stdout(broken()).into()));
+        assert!(!is_broken_pipe(&ExportError::Stdout(ErrorKind::StorageFull.into()).into()));
+        let file = OutputError::Write { path: PathBuf::from("a.npy"), source: broken() };
+        assert!(!is_broken_pipe(&file.into()));
+    }
 }

@@ -2,7 +2,8 @@
 
 use std::num::NonZeroUsize;
 
-use indicatif::{DecimalBytes, HumanCount};
+use indicatif::HumanCount;
+use spectroll::output::ByteCount;
 
 /// A number of threads: more than any machine has cores would only take long to start.
 pub(super) fn threads(text: &str) -> Result<NonZeroUsize, String> {
@@ -10,15 +11,32 @@ pub(super) fn threads(text: &str) -> Result<NonZeroUsize, String> {
     threads.and_then(NonZeroUsize::new).ok_or_else(|| "expected 1 to 1024".to_owned())
 }
 
-/// A count: digits, with `_` between them as one likes, or a whole number like 1e6.
+/// A count: digits, with `_` between them as one likes, or a whole number like 1e6, 10M or 1.5k.
 pub(super) fn count(text: &str) -> Result<u64, String> {
-    let digits = text.replace('_', "");
-    if let Ok(count) = digits.parse() {
-        return Ok(count);
-    }
-    match digits.parse::<f64>() {
-        Ok(value) if value >= 0.0 && value.fract() == 0.0 && value < 2f64.powi(64) => Ok(value as u64),
-        _ => Err("expected a whole number, like 1000000 or 1e6".to_owned()),
+    let text = text.replace('_', "");
+    whole(&text).ok_or_else(|| "expected a whole number, like 1000000, 1e6 or 1M".to_owned())
+}
+
+/// A whole number with a power of ten behind it, digit by digit: 1.1M as a float would be a little more.
+fn whole(text: &str) -> Option<u64> {
+    let suffixes = [('k', 3), ('M', 6), ('G', 9), ('T', 12)];
+    let suffix = suffixes.into_iter().find_map(|(unit, power)| Some((text.strip_suffix(unit)?, power)));
+    let (decimal, power) = match (suffix, text.split_once(['e', 'E'])) {
+        (Some(found), _) => found,
+        (None, Some((decimal, power))) => (decimal, power.parse::<usize>().ok()?),
+        (None, None) => (text, 0),
+    };
+    let (integer, fraction) = decimal.split_once('.').unwrap_or((decimal, ""));
+    let fraction = fraction.trim_end_matches('0');
+    let zeros = power.checked_sub(fraction.len())?;
+    let digits = integer.to_owned() + fraction;
+    // More zeros than u64 has digits are too many for all but 0.
+    let is_digits = !digits.is_empty() && digits.bytes().all(|digit| digit.is_ascii_digit());
+    let factor = 10u64.checked_pow(zeros.min(20).try_into().ok()?);
+    match digits.parse::<u64>() {
+        Ok(0) if is_digits => Some(0),
+        Ok(value) if is_digits => value.checked_mul(factor?),
+        _ => None,
     }
 }
 
@@ -32,6 +50,11 @@ pub(super) fn seed(text: &str) -> Result<u64, String> {
     }
 }
 
+/// A number of things by their names: "1 spectrum", "2,000 spectra".
+pub(super) fn counted(n: u64, one: &str, several: &str) -> String {
+    format!("{} {}", grouped(n), if n == 1 { one } else { several })
+}
+
 /// A number with its thousands set apart.
 pub(super) fn grouped(n: u64) -> String {
     HumanCount(n).to_string()
@@ -39,12 +62,61 @@ pub(super) fn grouped(n: u64) -> String {
 
 /// Bytes in the unit that suits them.
 pub(super) fn size(bytes: u64) -> String {
-    DecimalBytes(bytes).to_string()
+    ByteCount(bytes).to_string()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn counts_are_whole_numbers_with_powers_of_ten() {
+        for (text, value) in [
+            ("0", 0),
+            ("1_000_000", 1_000_000),
+            ("1e6", 1_000_000),
+            ("1k", 1000),
+            ("10M", 10_000_000),
+            ("1G", 1_000_000_000),
+            ("2T", 2_000_000_000_000),
+            ("1.1M", 1_100_000),
+            ("1.50k", 1500),
+            ("2.5e3", 2500),
+            ("5.0", 5),
+            ("0e99", 0),
+            ("18446744073709551615", u64::MAX),
+        ] {
+            assert_eq!(count(text), Ok(value), "{text}");
+        }
+        for text in [
+            "",
+            "k",
+            "-5",
+            "1.5",
+            "1.0005k",
+            "1e20",
+            "18446744073709551616",
+            "1K",
+            "1kk",
+            "1e6k",
+            "e6",
+            "+1",
+            "inf",
+        ] {
+            assert_eq!(
+                count(text).unwrap_err(),
+                "expected a whole number, like 1000000, 1e6 or 1M",
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn one_is_no_plural() {
+        assert_eq!(counted(1, "spectrum", "spectra"), "1 spectrum");
+        assert_eq!(counted(0, "spectrum", "spectra"), "0 spectra");
+        assert_eq!(counted(2000, "spectrum", "spectra"), "2,000 spectra");
+    }
 
     #[test]
     fn seeds_are_numbers_or_random() {

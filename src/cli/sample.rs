@@ -5,14 +5,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use serde::Serialize;
-use spectroll::export::{DrawExport, Writing};
+use spectroll::export::{DrawExport, Output, Writing};
 use spectroll::output::SetStatus;
 use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Stream};
 
 use super::exit::Usage;
-use super::options::{EngineArguments, OutputArguments, RecipeArguments};
-use super::parse::{count, grouped};
-use super::run::{self, DryRun, folder_of};
+use super::options::{EngineArguments, OutputArguments, Purpose, RecipeArguments};
+use super::parse::{count, counted, seed};
+use super::run::{self, DryRun};
 use super::{interrupt, model_at};
 
 /// Draw spectra from a model
@@ -27,11 +27,11 @@ pub(crate) struct Arguments {
     /// The wavelengths of a built-in model, in nm, at which it is fitted [default: those of its name]
     #[arg(long, value_name = "START:STEP:STOP")]
     wavelengths: Option<Grid>,
-    /// Number of spectra (1000000 and 1e6 are the same)
+    /// Number of spectra (1000000, 1e6 and 1M are the same; k, M, G and T are powers of 1000)
     #[arg(short = 'n', long, value_name = "COUNT", value_parser = count, allow_negative_numbers = true)]
     count: u64,
-    /// The seed of the random numbers
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    /// The seed of the random numbers, or random for one that the summary and the data set tell
+    #[arg(long, default_value_t = 0, value_name = "SEED|random", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// The index of the first draw
     #[arg(long, default_value_t = 0, value_parser = count, allow_negative_numbers = true)]
@@ -76,11 +76,14 @@ struct Report {
     seconds: f64,
     draws_per_second: f64,
     engine: String,
+    /// The engine alone, without why it is not another one.
+    #[serde(skip)]
+    drawn_by: String,
     version: &'static str,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let output = arguments.output.resolve()?;
+    let output = arguments.output.resolve(Purpose::of(arguments.dry_run))?;
     let model = model_at(&arguments.model, arguments.wavelengths)?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
@@ -98,8 +101,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let engine = arguments.engine.open()?;
     if arguments.dry_run {
-        return DryRun::new(&output, (&schema, &companions), &recipe, &engine)?.print(arguments.json);
+        DryRun::new(&output, (&schema, &companions), &recipe, &engine)?.print(arguments.json)?;
+        return Ok(output.check_space(&schema, &companions)?);
     }
+    output.check_space(&schema, &companions)?;
     let why = match (arguments.engine.choice().unwrap_or_default(), engine.adapter()) {
         (EngineChoice::Auto, None) => ", no graphics hardware was found",
         _ => "",
@@ -116,6 +121,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let seconds = start.elapsed().as_secs_f64();
     report(
         arguments,
+        &output,
         outcome,
         &Report {
             model: arguments.model.clone(),
@@ -132,35 +138,31 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             seconds,
             draws_per_second: summary.draws as f64 / seconds,
             engine: format!("{engine}{why}"),
+            drawn_by: engine.to_string(),
             version: env!("CARGO_PKG_VERSION"),
         },
     )
 }
 
-fn report(arguments: &Arguments, outcome: SetStatus, made: &Report) -> anyhow::Result<()> {
+fn report(arguments: &Arguments, output: &Output, outcome: SetStatus, made: &Report) -> anyhow::Result<()> {
     if arguments.json {
         writeln!(io::stdout(), "{}", serde_json::to_string_pretty(made)?)?;
     } else if !arguments.quiet {
         let DrawSummary { draws, attempts, above_one } = made.summary;
+        let kind = run::kind(output, made.files);
+        let spectra = counted(draws, "spectrum", "spectra");
+        let above = run::above_one(above_one, draws, "--bounds both");
+        let above = above.map_or_else(String::new, |above| format!("; {above}"));
+        tell!("{}: {kind}{spectra} of {}{above}", made.output, counted(made.bands as u64, "band", "bands"));
         let accepted = made.acceptance.map_or(String::new(), |a| format!(" ({:.4} % accepted)", 100.0 * a));
-        let folder = made.files.map_or_else(String::new, |files| format!("{}, ", folder_of(files)));
-        tell!("{}: {folder}{} spectra of {} bands", made.output, grouped(draws), made.bands);
-        tell!("  {} candidates{accepted}", grouped(attempts));
-        if above_one > 0 {
-            let share = 100.0 * above_one as f64 / draws as f64;
-            tell!("  {} spectra ({share:.2} %) reach 1 or more after scaling", grouped(above_one));
-        }
+        tell!("  {}{accepted}, seed {}", counted(attempts, "candidate", "candidates"), made.seed);
         let rate = match draws {
             ..100_000 => String::new(), // starting up is most of so short a run
             _ => format!("{:.2} million a second, ", made.draws_per_second / 1e6),
         };
-        tell!("  {:.2} s, {rate}{}", made.seconds, made.engine);
-        if let SetStatus::Waiting { done, chunks } = outcome {
-            tell!(
-                "  {} of {} chunks are finished: the set gets its name with the last",
-                grouped(done),
-                grouped(chunks)
-            );
+        tell!("  {:.2} s, {rate}{}", made.seconds, made.drawn_by);
+        if let Some(status) = run::status(output, outcome) {
+            tell!("  {status}");
         }
     }
     Ok(())

@@ -8,17 +8,17 @@ use std::time::Instant;
 use serde::Serialize;
 use spectroll::evaluation::plot::PictureFormat;
 use spectroll::export::{ArraySelection, Companions, ExportError, Output, SceneExport, Writing};
-use spectroll::output::{PendingFile, Schema, SetStatus};
+use spectroll::output::{OutputError, PendingFile, Schema, SetStatus};
 use spectroll::scene::{GroupSummary, PRESETS, Scene, Workload};
 use spectroll::{Engine, Quantity};
 
 use super::exit::Usage;
 use super::interrupt;
-use super::options::{EngineArguments, OutputArguments};
-use super::parse::{grouped, seed, size};
+use super::options::{EngineArguments, OutputArguments, Purpose};
+use super::parse::{counted, grouped, seed, size};
 use super::picture;
 use super::picture::scene::Preview;
-use super::run::{self, folder_of, free, room};
+use super::run::{self, folder_of};
 
 /// Draw scenes of lights, surfaces and targets, as a file says
 ///
@@ -120,6 +120,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.dry_run {
         return job.dry_run(&engine, planned.as_ref());
     }
+    planned.as_ref().map_or(Ok(()), Planned::check_space)?;
     match (planned, picture) {
         (Some(planned), picture) => job.run(&engine, planned, picture),
         (None, Some(picture)) => {
@@ -176,6 +177,10 @@ impl Planned {
     fn files(&self) -> Option<u64> {
         self.output.text_files(&self.schema, &self.companions)
     }
+
+    fn check_space(&self) -> Result<(), OutputError> {
+        self.output.check_space(&self.schema, &self.companions)
+    }
 }
 
 /// A picture that can be written.
@@ -203,7 +208,7 @@ impl Job<'_> {
         if self.arguments.json && self.arguments.output.to_stdout() {
             return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
         }
-        let output = self.arguments.output.resolve()?;
+        let output = self.arguments.output.resolve(Purpose::of(self.arguments.dry_run))?;
         let (schema, companions) = (self.export.schema(&output), self.export.companions());
         output.check(&schema, &companions)?;
         Ok(Planned { output, schema, companions })
@@ -246,10 +251,10 @@ impl Job<'_> {
         let (quiet, to_stdout) = (self.arguments.quiet, self.arguments.output.to_stdout());
         let outcome = run::make(writing, &mut rows, (quiet, to_stdout))?;
         let seconds = start.elapsed().as_secs_f64();
-        self.report(outcome, Report { drawn: rows.drawn, files, seconds, ..self.workload(engine) })
+        self.report(&output, outcome, Report { drawn: rows.drawn, files, seconds, ..self.workload(engine) })
     }
 
-    fn report(&self, outcome: SetStatus, made: Report) -> anyhow::Result<()> {
+    fn report(&self, output: &Output, outcome: SetStatus, made: Report) -> anyhow::Result<()> {
         let seconds = made.seconds;
         let report = Report {
             output: Some(self.arguments.output.output.display().to_string()),
@@ -260,23 +265,23 @@ impl Job<'_> {
         if self.arguments.json {
             writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
         } else if !self.arguments.quiet {
-            let (count, bands) = (grouped(self.count()), self.scene.grid().len());
-            let folder = report.files.map_or_else(String::new, |files| format!("{}, ", folder_of(files)));
+            let (scenes, bands) = (counted(self.count(), "scene", "scenes"), self.scene.grid().len());
+            let kind = run::kind(output, report.files);
             let name = self.arguments.output.output.display();
-            tell!("{name}: {folder}{count} scenes of {bands} bands");
+            tell!("{name}: {kind}{scenes} of {}", counted(bands as u64, "band", "bands"));
             for GroupSummary { group, summary } in &report.drawn {
                 let accepted = summary.acceptance().map_or_else(String::new, |share| {
-                    format!(", {} candidates ({:.2} % accepted)", grouped(summary.attempts), 100.0 * share)
+                    let candidates = counted(summary.attempts, "candidate", "candidates");
+                    format!(", {candidates} ({:.2} % accepted)", 100.0 * share)
                 });
-                tell!("  {group}: {} spectra drawn{accepted}", grouped(summary.draws));
-                if summary.above_one > 0 {
-                    tell!("    {} of them reach 1 or more after scaling", grouped(summary.above_one));
-                }
+                let above = run::above_one(summary.above_one, summary.draws, "bounds = \"both\"");
+                let above = above.map_or_else(String::new, |above| format!("; {above}"));
+                tell!("  {group}: {} drawn{accepted}{above}", counted(summary.draws, "spectrum", "spectra"));
             }
             self.tell_seed();
             tell!("  {seconds:.2} s, {}", report.engine);
-            if let SetStatus::Waiting { done, chunks } = outcome {
-                tell!("  {} of {} chunks are finished", grouped(done), grouped(chunks));
+            if let Some(status) = run::status(output, outcome) {
+                tell!("  {status}");
             }
         }
         Ok(())
@@ -317,12 +322,19 @@ impl Job<'_> {
 
     fn dry_run(&self, engine: &Engine, planned: Option<&Planned>) -> anyhow::Result<()> {
         let report = Report { files: planned.and_then(Planned::files), ..self.workload(engine) };
-        let mut out = io::stdout();
         if self.arguments.json {
-            return Ok(writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?);
+            writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
+        } else {
+            self.print(report, planned)?;
         }
+        Ok(planned.map_or(Ok(()), Planned::check_space)?)
+    }
+
+    fn print(&self, report: Report, planned: Option<&Planned>) -> anyhow::Result<()> {
+        let mut out = io::stdout();
         let Report { scene, workload, engine, files, .. } = report;
-        writeln!(out, "{scene}: {} scenes on {} nm", grouped(self.count()), self.scene.grid())?;
+        let scenes = counted(self.count(), "scene", "scenes");
+        writeln!(out, "{scene}: {scenes} on {} nm", self.scene.grid())?;
         for group in &workload.groups {
             let by = match (group.shader, group.draws_per_scene, group.draws_once) {
                 (_, 0, 0) => "nothing drawn".to_owned(),
@@ -350,16 +362,16 @@ impl Job<'_> {
         };
         writeln!(
             out,
-            "  {} spectra drawn by {engine}, {shaders}, {}",
-            grouped(workload.draws),
+            "  {} drawn by {engine}, {shaders}, {}",
+            counted(workload.draws, "spectrum", "spectra"),
             size(workload.bytes)
         )?;
         if let Some(files) = files {
             writeln!(out, "  {}: {}", self.arguments.output.output.display(), folder_of(files))?;
         }
-        let output = &self.arguments.output;
-        if !output.to_stdout() && output.is_given() {
-            writeln!(out, "  {}", room(&output.output, workload.bytes, free(&output.output)))?;
+        if let Some(Planned { output, schema, companions }) = planned {
+            let lines = [run::part(output, schema), run::room(output, output.space(schema, companions))];
+            lines.into_iter().flatten().try_for_each(|line| writeln!(out, "  {line}"))?;
         }
         Ok(())
     }

@@ -42,7 +42,9 @@ impl<'a> DrawExport<'a> {
     pub fn schema(&self, output: &Output) -> Schema {
         let fields = self.recipe.formats().into_iter();
         Schema {
-            fields: fields.map(|format| field(self.recipe, format).stored_as(output.stored())).collect(),
+            fields: fields
+                .map(|format| field(self.recipe, format).stored_as(output.stored(format.quantity)))
+                .collect(),
             row: "draw".to_owned(),
             shared: Vec::new(),
             count: self.draws.count,
@@ -75,6 +77,7 @@ impl<'a> DrawExport<'a> {
     pub fn write(&self, engine: &'a Engine, output: &Output) -> Result<DrawSummary, ExportError> {
         let (schema, companions) = (self.schema(output), self.companions());
         output.check(&schema, &companions)?;
+        output.check_space(&schema, &companions)?;
         let mut rows = self.rows(engine)?;
         let writing = Writing::open(output, schema, &companions, engine, &mut rows)?;
         writing.run(&mut rows, &mut |_| ControlFlow::Continue(()))?;

@@ -23,6 +23,7 @@ mod model;
 mod output;
 pub mod provenance;
 mod scenes;
+mod space;
 mod writing;
 
 use std::ops::Range;
@@ -30,6 +31,7 @@ use std::ops::Range;
 pub use draws::{DrawExport, DrawRows};
 pub use output::{Destination, Output};
 pub use scenes::{ArraySelection, SceneExport, SceneRows, SelectionError, model_sums};
+pub use space::{Space, SpaceCheck};
 pub use writing::{ExportError, Writing};
 
 use crate::engine::EngineError;

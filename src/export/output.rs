@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Companions;
+use super::{Companions, SpaceCheck};
 use crate::output::{
     ChunkFormat, FileFormat, IfExists, OutputError, Schema, SetMode, SetPlan, Shard, spd_files,
 };
-use crate::quantity::Dtype;
+use crate::quantity::{Dtype, Quantity};
 
 /// The kind of thing that is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,10 +40,11 @@ impl Destination {
 pub struct Output {
     pub(super) path: PathBuf,
     pub(super) destination: Destination,
-    dtype: Dtype,
+    pub(super) dtype: Dtype,
     chunk: Option<u64>,
     pub(super) shard: Shard,
     pub(super) mode: SetMode,
+    pub(super) space_check: SpaceCheck,
 }
 
 impl Output {
@@ -68,15 +69,17 @@ impl Output {
             chunk: None,
             shard: Shard::WHOLE,
             mode: SetMode::Create,
+            space_check: SpaceCheck::default(),
         }
     }
 
-    /// The type of the numbers ([`Dtype::F32`]).
+    /// The type of the numbers ([`Dtype::F32`]). [`Dtype::F16`] is that of spectra alone: beside them, labels such as
+    /// luminous reflectances and XYZ stay float32.
     pub fn dtype(self, dtype: Dtype) -> Self {
         Output { dtype, ..self }
     }
 
-    /// The number of rows in each chunk of a set, at least 1 (what makes about 16 MiB).
+    /// The number of rows in each chunk of a set, at least 1 and at most all (what makes about 16 MiB).
     pub fn chunk(self, rows: u64) -> Self {
         Output { chunk: Some(rows.max(1)), ..self }
     }
@@ -91,6 +94,11 @@ impl Output {
         Output { mode, ..self }
     }
 
+    /// Whether the data set must have room before it is begun ([`SpaceCheck::Require`]).
+    pub fn space_check(self, space_check: SpaceCheck) -> Self {
+        Output { space_check, ..self }
+    }
+
     /// The path.
     pub fn path(&self) -> &Path {
         &self.path
@@ -101,15 +109,26 @@ impl Output {
         self.destination
     }
 
-    /// The type that floats are written as.
-    pub(super) fn stored(&self) -> Dtype {
-        self.dtype
+    /// The part of a set that this process makes.
+    pub fn part(&self) -> Shard {
+        self.shard
+    }
+
+    /// The type that the floats of a quantity are written as. Labels are few beside spectra, and half precision would
+    /// tell an LRV of 0.4 to three digits.
+    pub(super) fn stored(&self, quantity: Quantity) -> Dtype {
+        match (self.dtype, quantity) {
+            (Dtype::F16, Quantity::Spectra) => Dtype::F16,
+            (Dtype::F16, _) => Dtype::F32,
+            (dtype, _) => dtype,
+        }
     }
 
     /// Refuses what the destination cannot hold.
     pub fn check(&self, schema: &Schema, companions: &Companions) -> Result<(), OutputError> {
         let file = |format: FileFormat| format.check(&self.path, schema, &companions.spectra);
         match self.destination {
+            Destination::Stdout(format) if !format.is_streamed() => Err(OutputError::NotStreamed),
             Destination::Stdout(format) | Destination::File(format) => file(format),
             Destination::SpdFolder => file(FileFormat::Spd),
             Destination::Set(chunks) => chunks.check(&self.path, schema),
@@ -125,7 +144,8 @@ impl Output {
     pub fn plan(&self, schema: &Schema) -> Option<SetPlan> {
         let Destination::Set(layout) = self.destination else { return None };
         let default = || ChunkFormat::default_chunk(schema.row_bytes(), schema.count);
-        Some(SetPlan { layout, chunk: self.chunk.unwrap_or_else(default), schema: schema.clone() })
+        let chunk = self.chunk.unwrap_or_else(default).min(schema.count.max(1));
+        Some(SetPlan { layout, chunk, schema: schema.clone() })
     }
 
     pub(super) fn if_exists(&self) -> IfExists {

@@ -106,7 +106,10 @@ impl<'a> SceneExport<'a> {
         let (shared, repeated): (Vec<_>, Vec<_>) =
             wanted().filter(|array| !array.per_scene).partition(|_| holds_shared);
         Schema {
-            fields: varying.chain(repeated).map(|array| field(array).stored_as(output.stored())).collect(),
+            fields: varying
+                .chain(repeated)
+                .map(|array| field(array).stored_as(output.stored(array.quantity)))
+                .collect(),
             row: "scene".to_owned(),
             shared: shared.into_iter().map(description).collect(),
             count: self.scenes.end - self.scenes.start,
@@ -157,6 +160,7 @@ impl<'a> SceneExport<'a> {
     pub fn write(&self, engine: &'a Engine, output: &Output) -> Result<Vec<GroupSummary>, ExportError> {
         let (schema, companions) = (self.schema(output), self.companions());
         output.check(&schema, &companions)?;
+        output.check_space(&schema, &companions)?;
         let mut rows = self.rows(engine, &schema)?;
         let writing = Writing::open(output, schema, &companions, engine, &mut rows)?;
         writing.run(&mut rows, &mut |_| ControlFlow::Continue(()))?;

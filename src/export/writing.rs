@@ -6,9 +6,7 @@ use std::path::PathBuf;
 
 use super::{Companions, Destination, Output, Rows};
 use crate::engine::{Engine, EngineError};
-use crate::output::{
-    CsvWriter, FileFormat, FileWriter, OutputError, Schema, SetStatus, SetWriter, SpdFolder,
-};
+use crate::output::{FileWriter, OutputError, Schema, SetStatus, SetWriter, SpdFolder, StreamWriter};
 
 /// Error that ended an export before its data set was complete.
 #[derive(Debug, thiserror::Error)]
@@ -56,7 +54,7 @@ pub struct Writing {
 }
 
 enum Sink {
-    Csv(CsvWriter),
+    Stream(StreamWriter),
     File(FileWriter),
     Spd(SpdFolder),
     Set(Box<SetWriter>),
@@ -77,11 +75,10 @@ impl Writing {
             schema.attributes.insert("rounding".to_owned(), rows.rounding()?.into());
         }
         let sink = match output.destination {
-            Destination::Stdout(FileFormat::Csv) => {
-                let csv = CsvWriter::new(BufWriter::new(io::stdout()), &schema);
-                Sink::Csv(csv.map_err(ExportError::Stdout)?)
+            Destination::Stdout(format) => {
+                let stream = StreamWriter::new(BufWriter::new(io::stdout()), format, &schema)?;
+                Sink::Stream(stream.map_err(ExportError::Stdout)?)
             }
-            Destination::Stdout(format) => unreachable!("{format:?} is not streamed"),
             Destination::File(format) => {
                 Sink::File(FileWriter::create(path, format, &schema, &companions.spectra, if_exists)?)
             }
@@ -151,7 +148,7 @@ impl Writing {
 
     fn write(&mut self, columns: &[&[u8]]) -> Result<(), ExportError> {
         match &mut self.sink {
-            Sink::Csv(csv) => csv.write(columns).map_err(ExportError::Stdout),
+            Sink::Stream(stream) => stream.write(columns).map_err(ExportError::Stdout),
             Sink::File(file) => Ok(file.write(columns)?),
             Sink::Spd(folder) => Ok(folder.write(columns)?),
             Sink::Set(set) => Ok(set.write(columns)?),
@@ -160,7 +157,7 @@ impl Writing {
 
     fn finish(self) -> Result<SetStatus, ExportError> {
         match self.sink {
-            Sink::Csv(_) => {} // each window was flushed
+            Sink::Stream(stream) => stream.finish().map_err(ExportError::Stdout)?,
             Sink::File(file) => file.finish()?,
             Sink::Spd(folder) => folder.finish()?,
             Sink::Set(set) => return Ok(set.finish()?),

@@ -4,6 +4,7 @@
 //! in a single file ([`FileWriter`]), a folder of text files ([`SpdFolder`]), or a set of chunks that can be resumed
 //! and shared ([`SetWriter`]).
 
+mod byte_count;
 mod csv;
 #[cfg(feature = "hdf5")]
 mod h5;
@@ -22,6 +23,8 @@ use std::path::{Path, PathBuf};
 
 use crate::quantity::Dtype;
 
+pub use byte_count::ByteCount;
+pub(crate) use pending::available_space;
 pub use pending::{FolderMark, IfExists, PendingFile, PendingFolder, write_file};
 pub use schema::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
 pub use set::{ChunkFormat, Progress, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge};
@@ -85,6 +88,10 @@ pub enum OutputError {
          delete: choose another format, or write it anyway"
     )]
     ManyFiles { path: PathBuf, count: u64 },
+    #[error("standard output takes CSV and .npy alone: choose one of them, or name a file")]
+    NotStreamed,
+    #[error("{} needs {bound}{needs} and {free} are free here", path.display())]
+    NoSpace { path: PathBuf, bound: &'static str, needs: ByteCount, free: ByteCount },
     #[error("{root:?} holds an unfinished data set: resume it, or replace it")]
     Unfinished { path: PathBuf, root: PathBuf },
     #[error("{path:?} holds another data set: {difference}")]
@@ -132,6 +139,11 @@ impl FileFormat {
             Some("spd") => Ok(FileFormat::Spd),
             _ => Err(OutputError::UnknownFormat { path: path.to_owned() }),
         }
+    }
+
+    /// Whether the bytes of the format come in order, so that they can go to a pipe.
+    pub fn is_streamed(self) -> bool {
+        matches!(self, FileFormat::Csv | FileFormat::Npy)
     }
 
     /// An error where the format cannot hold what a schema says, of which `spectra` are spectra, or was left out of this
@@ -262,18 +274,34 @@ fn encoder(
     })
 }
 
-/// Writer of CSV to a stream, such as standard output.
-pub struct CsvWriter(Box<dyn Encoder>);
+/// Writer of a data set to a stream, such as standard output.
+pub struct StreamWriter(Box<dyn Encoder>);
 
-impl CsvWriter {
-    /// Begins with the header.
-    pub fn new(to: impl io::Write + 'static, schema: &Schema) -> io::Result<CsvWriter> {
-        Ok(CsvWriter(Box::new(csv::Csv::begin(to, schema)?)))
+impl StreamWriter {
+    /// Begins with the header, which may be an error of the stream. The format is one that can be streamed.
+    pub fn new(
+        to: impl io::Write + 'static,
+        format: FileFormat,
+        schema: &Schema,
+    ) -> Result<io::Result<StreamWriter>, OutputError> {
+        fn boxed<E: Encoder + 'static>(encoder: io::Result<E>) -> io::Result<StreamWriter> {
+            Ok(StreamWriter(Box::new(encoder?)))
+        }
+        match format {
+            FileFormat::Csv => Ok(boxed(csv::Csv::begin(to, schema))),
+            FileFormat::Npy => Ok(boxed(npy::Npy::begin(to, schema))),
+            _ => Err(OutputError::NotStreamed),
+        }
     }
 
     /// Writes the next draws: a column for each field of the schema.
     pub fn write(&mut self, columns: &[&[u8]]) -> io::Result<()> {
         self.0.write(columns)
+    }
+
+    /// Hands on what is left.
+    pub fn finish(self) -> io::Result<()> {
+        self.0.finish()
     }
 }
 

@@ -38,6 +38,12 @@ impl PendingFile {
         if path.is_dir() {
             return Err(OutputError::Folder { path });
         }
+        // The temporary name may be short enough where this one is not.
+        if let Err(source) = path.symlink_metadata()
+            && source.kind() == io::ErrorKind::InvalidFilename
+        {
+            return Err(OutputError::Write { path, source });
+        }
         if path.exists() && !path.is_file() {
             return Err(OutputError::Special { path }); // a device, say: --force -o /dev/null must not replace it
         }
@@ -223,6 +229,14 @@ pub(super) fn ignore_missing(error: io::Error) -> io::Result<()> {
 /// Syncs the names in a folder to disk. Not every file system can, and the data are safe either way.
 pub(super) fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}
+
+/// Free bytes where a path names something, for whoever runs this; `None` where that cannot be told.
+pub(crate) fn available_space(path: &Path) -> Option<u64> {
+    #[cfg(any(unix, windows))]
+    return fs4::available_space(folder(path)).ok();
+    #[cfg(not(any(unix, windows)))]
+    return None;
 }
 
 /// Folder of the file that a path names.

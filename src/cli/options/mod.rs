@@ -7,5 +7,5 @@ mod recipe;
 mod shard;
 
 pub(super) use engine::EngineArguments;
-pub(super) use output::OutputArguments;
+pub(super) use output::{OutputArguments, Purpose};
 pub(super) use recipe::RecipeArguments;

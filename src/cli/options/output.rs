@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use spectroll::Dtype;
-use spectroll::export::{Destination, Output};
-use spectroll::output::{ChunkFormat, FileFormat, IfExists, SetMode};
+use spectroll::export::{Destination, Output, SpaceCheck};
+use spectroll::output::{ChunkFormat, FileFormat, IfExists, SetMode, Shard};
 
 use super::shard::ShardName;
 use crate::cli::exit::Usage;
@@ -16,14 +16,14 @@ use crate::cli::parse::count;
 #[derive(clap::Args)]
 pub(in crate::cli) struct OutputArguments {
     /// Write to this file: .npy, .npz, .csv, .h5, .mat, .parquet or .zarr; FOLDER/ with --format npy, parquet or spd;
-    /// or -, which is CSV on standard output
+    /// or -, which is standard output, as CSV or with --format npy
     // The parser of paths would not take the empty one that stands for none in `scene`.
     #[arg(short, long, value_name = "OUT", value_parser = OsStringValueParser::new().map(PathBuf::from))]
     pub(in crate::cli) output: PathBuf,
     /// The format [default: what the name says]
     #[arg(long, value_enum)]
     format: Option<FileFormat>,
-    /// The type of the numbers
+    /// The type of the numbers; beside f16 spectra, labels such as lrv, intensity and xyz stay f32
     #[arg(long, value_enum, default_value = "f32")]
     dtype: Dtype,
     /// Number of draws per chunk of a .zarr or of FOLDER/ [default: about 16 MiB]
@@ -33,7 +33,8 @@ pub(in crate::cli) struct OutputArguments {
     #[arg(long, value_name = "LEVEL", num_args = 0..=1, default_missing_value = "3",
           value_parser = clap::value_parser!(i32).range(1..=22))]
     zstd: Option<i32>,
-    /// Make only the I-th of N parts of a .zarr or FOLDER/; auto takes them from Slurm's or Kubernetes' variables
+    /// Make only the I-th of N parts of a .zarr or FOLDER/; auto takes them from Slurm's or Kubernetes' variables, which
+    /// a --dry-run does without
     #[arg(long, value_name = "I/N|auto|auto/N")]
     shard: Option<ShardName>,
     /// Go on with a .zarr or FOLDER/ that an earlier run began, if one did
@@ -42,6 +43,25 @@ pub(in crate::cli) struct OutputArguments {
     /// Replace what exists
     #[arg(long, conflicts_with_all = ["resume", "shard"])]
     pub(in crate::cli) force: bool,
+    /// Begin although the disk has no room for all of it
+    #[arg(long)]
+    force_space: bool,
+}
+
+/// What the options are resolved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::cli) enum Purpose {
+    /// To make the data set, for which a shard has to be known.
+    Run,
+    /// To say what would be made: without a scheduler, the whole of it.
+    DryRun,
+}
+
+impl Purpose {
+    /// The purpose of a command with or without `--dry-run`.
+    pub(in crate::cli) fn of(dry_run: bool) -> Purpose {
+        if dry_run { Purpose::DryRun } else { Purpose::Run }
+    }
 }
 
 impl OutputArguments {
@@ -60,7 +80,7 @@ impl OutputArguments {
     }
 
     /// Combines the name and the options.
-    pub(in crate::cli) fn resolve(&self) -> anyhow::Result<Output> {
+    pub(in crate::cli) fn resolve(&self, purpose: Purpose) -> anyhow::Result<Output> {
         let destination = self.destination()?;
         let mut output = Output::at(&self.output, destination).dtype(self.dtype).mode(match self.resume {
             true => SetMode::Resume,
@@ -70,8 +90,14 @@ impl OutputArguments {
         if let Some(rows) = self.chunk {
             output = output.chunk(rows);
         }
+        if self.force_space {
+            output = output.space_check(SpaceCheck::Skip);
+        }
         if let Some(shard) = self.shard {
-            output = output.shard(shard.resolve()?);
+            output = output.shard(match (shard.resolve(), purpose) {
+                (Err(_), Purpose::DryRun) if shard.is_auto() => Shard::WHOLE,
+                (shard, _) => shard?,
+            });
         }
         Ok(output)
     }
@@ -81,10 +107,7 @@ impl OutputArguments {
         let is_folder =
             self.output.as_os_str().as_encoded_bytes().last().is_some_and(|&b| b == b'/' || b == b'\\');
         let destination = match self.format {
-            Some(FileFormat::Csv) | None if self.to_stdout() => Destination::Stdout(FileFormat::Csv),
-            Some(_) if self.to_stdout() => {
-                return Err(usage("standard output takes CSV only: name a file, or drop --format"));
-            }
+            format if self.to_stdout() => Destination::Stdout(format.unwrap_or(FileFormat::Csv)),
             _ => match self.format.map_or_else(|| FileFormat::of(&self.output), Ok)? {
                 FileFormat::Zarr => Destination::Set(ChunkFormat::Zarr { zstd: self.zstd }),
                 FileFormat::Spd => Destination::SpdFolder,

@@ -38,6 +38,11 @@ impl FromStr for ShardName {
 }
 
 impl ShardName {
+    /// Whether the scheduler says which shard it is.
+    pub(in crate::cli) fn is_auto(self) -> bool {
+        matches!(self, ShardName::Auto(_))
+    }
+
     /// The shard that this process is to make.
     pub(in crate::cli) fn resolve(self) -> Result<Shard, Usage> {
         match self {

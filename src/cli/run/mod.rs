@@ -2,13 +2,15 @@
 
 mod dry_run;
 mod progress;
+mod summary;
 
 use spectroll::export::{ExportError, Rows, Writing};
 use spectroll::output::SetStatus;
 
 use super::interrupt::{self, Interrupted};
-pub(super) use dry_run::{DryRun, folder_of, free, room};
+pub(super) use dry_run::{DryRun, folder_of};
 use progress::{Progress, Shown};
+pub(super) use summary::{above_one, kind, part, room, status};
 
 /// Draws the rows that are missing, shows how far that is, and completes the output.
 pub(super) fn make(

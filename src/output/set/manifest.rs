@@ -7,14 +7,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::super::pending::ignore_missing;
-use super::super::{OutputError, Schema};
-use super::{ChunkFormat, Part};
+use super::super::{OutputError, Schema, partial};
+use super::{ChunkFormat, Part, SetMode, Shard};
 
 /// Name of the manifest of a whole set.
 pub(super) const SEALED: &str = "_manifest.json";
@@ -44,6 +44,21 @@ impl SetPlan {
     pub fn draws(&self, chunk: u64) -> Range<u64> {
         let first = chunk * self.chunk;
         first..self.schema.count.min(first + self.chunk)
+    }
+
+    /// Number of chunks of a shard that no earlier run has made, as far as the manifests of a set at `path` tell.
+    pub(crate) fn missing(&self, path: &Path, shard: Shard, mode: SetMode) -> u64 {
+        let own = shard.of(self.chunks());
+        let all = own.end - own.start;
+        let path = PathBuf::from_iter(path.components());
+        let found = match mode {
+            SetMode::Replace => None,
+            SetMode::Create | SetMode::Resume => {
+                Manifest::sealed(&path).ok().or_else(|| Manifest::joined(&partial(&path)).ok().flatten())
+            }
+        };
+        let done = found.map_or(0, |found| found.chunks.range(own).count() as u64);
+        all.saturating_sub(done) // of another set, which opening this one will refuse, there may be more
     }
 
     /// Describes the first setting in which another plan differs, with the value here and the value there.

@@ -1,0 +1,71 @@
+//! Sentences of summaries and dry runs that all commands which make data sets share.
+
+use spectroll::export::{Destination, Output, Space};
+use spectroll::output::{ByteCount, Schema, SetStatus, Shard};
+
+use super::folder_of;
+use crate::cli::folder;
+use crate::cli::parse::{counted, grouped};
+
+/// What was made, before the number of rows, where the name does not say it.
+pub(in crate::cli) fn kind(output: &Output, files: Option<u64>) -> String {
+    match (files, output.destination()) {
+        (Some(files), _) => format!("{}, ", folder_of(files)),
+        (None, Destination::File(_)) if output.path().extension().is_none() => "one file, ".to_owned(),
+        _ => String::new(),
+    }
+}
+
+/// How many of the spectra reach 1, and how to have none; nothing where none does.
+pub(in crate::cli) fn above_one(above_one: u64, draws: u64, setting: &str) -> Option<String> {
+    let share = 100.0 * above_one as f64 / draws as f64;
+    let verb = if above_one == 1 { "reaches" } else { "reach" };
+    let count = grouped(above_one);
+    (above_one > 0).then(|| {
+        format!("{count} ({share:.2} %) {verb} 1 or more after scaling: use {setting} to keep all below 1")
+    })
+}
+
+/// The part of a set that this process makes, where there are several.
+pub(in crate::cli) fn part(output: &Output, schema: &Schema) -> Option<String> {
+    let shard = output.part();
+    let own = shard.of(output.plan(schema).filter(|_| shard != Shard::WHOLE)?.chunks());
+    let chunks = match own.end - own.start {
+        0 => "no chunks".to_owned(),
+        1 => format!("chunk {}", own.start),
+        _ => format!("chunks {} to {}", own.start, own.end - 1),
+    };
+    Some(format!("part {} of {}, {chunks}", shard.index, shard.count))
+}
+
+/// What a run of one of several processes leaves, where there are several.
+pub(in crate::cli) fn status(output: &Output, status: SetStatus) -> Option<String> {
+    match status {
+        SetStatus::Sealed => (output.part() != Shard::WHOLE).then(|| "the set is complete".to_owned()),
+        SetStatus::Waiting { done, chunks } => Some(format!(
+            "{} of {} finished: the set gets its name with the last",
+            grouped(done),
+            counted(chunks, "chunk is", "chunks are")
+        )),
+    }
+}
+
+/// Whether the disk has room; nothing of standard output.
+pub(in crate::cli) fn room(output: &Output, space: Space) -> Option<String> {
+    if matches!(output.destination(), Destination::Stdout(_)) {
+        return None;
+    }
+    let folder = folder(output.path());
+    Some(match space.free {
+        Some(free) => {
+            let enough = match free {
+                free if free >= space.bytes => "enough",
+                _ if space.fits() => "perhaps enough",
+                _ => "not enough",
+            };
+            format!("{} are free in {folder:?}, which is {enough}", ByteCount(free))
+        }
+        None if folder.is_dir() => format!("how much is free in {folder:?} cannot be told"),
+        None => format!("{folder:?} does not exist: create it first"),
+    })
+}
