@@ -45,7 +45,7 @@ pub use dataset::{BuiltinTable, Dataset, DatasetError, SpectrumKind, Table};
 pub use draw_status::DrawStatus;
 pub use engine::{Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, adapters};
 pub use grid::{Extrapolation, Grid, GridError};
-pub use model::{Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};
+pub use model::{BuiltinModel, Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};
 pub use program::Bounds;
 pub use quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
 pub use random::philox::philox;

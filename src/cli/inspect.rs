@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use spectroll::{CoverSize, Model, Normalization, Recipe, RecipeError};
+use spectroll::{Bounds, CoverSize, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind};
 
 use super::options::RecipeArguments;
 use super::parse::grouped;
@@ -20,6 +20,10 @@ pub(crate) struct Arguments {
     /// The model: a file, or the name of a built-in one
     #[arg(value_name = "MODEL")]
     pub(crate) model: String,
+
+    /// Fit a built-in model at these wavelengths first, start:step:stop in nm
+    #[arg(long, value_name = "GRID")]
+    wavelengths: Option<Grid>,
 
     /// Draw the model into this file, .svg or .png
     #[arg(short, long, value_name = "PATH")]
@@ -40,7 +44,7 @@ pub(crate) struct Arguments {
 /// Prints the table, after making the picture where one is asked for.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
-    let model = super::model(&arguments.model)?;
+    let model = super::model_at(&arguments.model, arguments.wavelengths)?;
     let recipe = arguments.request.recipe(&model);
     if let (Some(path), Some(format)) = (&arguments.output, format) {
         let figure =
@@ -70,7 +74,7 @@ fn table(name: &str, model: &Model, recipe: &Result<Recipe, RecipeError>) -> Str
     }
     match recipe {
         Ok(recipe) => {
-            line(&mut text, "probability", &format!("{} (estimated)", share(recipe.probability())));
+            line(&mut text, "accepted", &accepted(recipe));
             line(&mut text, "candidates", &candidates(recipe));
         }
         Err(e) => line(&mut text, "refused", &e.to_string()),
@@ -133,11 +137,19 @@ fn candidates(recipe: &Recipe) -> String {
     }
 }
 
-fn share(probability: f64) -> String {
-    match probability {
-        0.01.. => format!("{:.2} % of the model's spectra obey the rule", 100.0 * probability),
-        _ => format!("{probability:.3e} of the model's spectra obey the rule"),
-    }
+/// The share of the model's Gaussian that is accepted, and the rule.
+fn accepted(recipe: &Recipe) -> String {
+    let rule = match (recipe.model().kind(), recipe.settings().lrv, recipe.settings().bounds) {
+        (SpectrumKind::Illuminant, ..) => "power above 0 in every band",
+        (SpectrumKind::Reflectance, None, _) | (_, _, Bounds::Base) => "0 < reflectance < 1 in every band",
+        (_, _, Bounds::Scaled) => "0 < scaled reflectance < 1 in every band",
+        (_, _, Bounds::Both) => "0 < reflectance < 1 in every band, before and after scaling",
+    };
+    let share = match recipe.probability() {
+        probability @ 0.01.. => format!("{:.2} %", 100.0 * probability),
+        probability => format!("{probability:.3e}"),
+    };
+    format!("{share} of the model's candidates, by an estimate ({rule})")
 }
 
 /// A row a component.

@@ -7,13 +7,13 @@ use std::time::Instant;
 use serde::Serialize;
 use spectroll::export::{DrawExport, Writing};
 use spectroll::output::SetStatus;
-use spectroll::{DrawRange, DrawSummary, EngineChoice, Stream};
+use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Stream};
 
 use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, RecipeArguments};
 use super::parse::{count, grouped};
 use super::run::{self, DryRun};
-use super::{interrupt, model};
+use super::{interrupt, model_at};
 
 /// Draw spectra from a model
 ///
@@ -24,6 +24,9 @@ pub(crate) struct Arguments {
     /// A model file, or munsell-vrhel, granada, munsell-vrhel-5nm, granada-5nm
     #[arg(value_name = "MODEL")]
     model: String,
+    /// Fit a built-in model at these wavelengths first, start:step:stop in nm
+    #[arg(long, value_name = "GRID")]
+    wavelengths: Option<Grid>,
     /// How many spectra (1000000 and 1e6 are the same)
     #[arg(short = 'n', long, value_name = "COUNT", value_parser = count, allow_negative_numbers = true)]
     count: u64,
@@ -76,7 +79,7 @@ struct Report {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = arguments.output.resolve()?;
-    let model = model(&arguments.model)?;
+    let model = model_at(&arguments.model, arguments.wavelengths)?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
     let stream = match &arguments.stream {

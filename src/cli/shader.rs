@@ -2,7 +2,9 @@
 
 use std::io::Write;
 
-use super::model;
+use spectroll::Grid;
+
+use super::model_at;
 use super::options::RecipeArguments;
 
 /// Print the draw as WGSL functions, for a shader of your own
@@ -16,6 +18,9 @@ pub(crate) struct Arguments {
     /// A model file or the name of a built-in model
     #[arg(value_name = "MODEL")]
     model: String,
+    /// Fit a built-in model at these wavelengths first, start:step:stop in nm
+    #[arg(long, value_name = "GRID")]
+    wavelengths: Option<Grid>,
     #[command(flatten)]
     request: RecipeArguments,
     /// What every name starts with
@@ -27,7 +32,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let model = model(&arguments.model)?;
+    let model = model_at(&arguments.model, arguments.wavelengths)?;
     let recipe = arguments.request.recipe(&model)?;
     let text = recipe.wgsl(&arguments.prefix)?;
     let mut out = std::io::stdout().lock();

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::{Table, mat};
+use nalgebra::DMatrix;
+
+use super::matrix::Matrix;
+use super::{SpectrumKind, Table, mat};
 
 /// A table that is compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +70,33 @@ impl BuiltinTable {
     }
 }
 
+/// The daylights measured at Granada, 2,600 at 300 to 1100 nm by 5 nm, as far as 56 principal components tell them; see
+/// `data/README.md`.
+pub(crate) fn daylights() -> Table {
+    const NAME: &str = "granada-shapes.mat";
+    let bytes = include_bytes!("../../data/granada-shapes.mat");
+    let matrices = mat::matrices(Path::new(NAME), bytes).expect("compiled-in tables are readable");
+    let matrix = |name: &str| {
+        let Matrix { rows, columns, values, .. } =
+            matrices.iter().find(|m| m.name == name).expect("the file holds every part");
+        DMatrix::from_column_slice(*rows, *columns, values)
+    };
+    let (mut weights, scale) = (matrix("weights"), matrix("scale"));
+    weights.row_iter_mut().zip(scale.iter()).for_each(|(mut row, scale)| row *= *scale);
+    let mut spectra = matrix("basis") * weights;
+    let (mean, powers) = (matrix("mean"), matrix("powers"));
+    for (mut spectrum, power) in spectra.column_iter_mut().zip(powers.iter()) {
+        spectrum += mean.column(0);
+        spectrum *= *power;
+    }
+    let sampling = matrix("S_granada");
+    let wavelengths = (0..spectra.nrows()).map(|band| sampling[0] + band as f64 * sampling[1]).collect();
+    let name = "daylightGranadaLong.mat:daylightGranada, 56 of its principal components";
+    let mut table = Table::from_columns(name, wavelengths, spectra).expect("the daylights are finite");
+    table.kind = Some(SpectrumKind::Illuminant);
+    table
+}
+
 impl Table {
     fn crop(&mut self, first: f64, last: f64) {
         let start = self.wavelengths.partition_point(|&w| w < first);
@@ -95,6 +125,16 @@ mod tests {
             assert_eq!((table.len(), wavelengths.len(), table.kind()), (count, bands, kind), "{name}");
             assert_eq!((wavelengths[0], wavelengths[bands - 1]), (first, last), "{name}");
         }
+    }
+
+    #[test]
+    fn daylights_have_their_shape_range_and_kind() {
+        let table = daylights();
+        let wavelengths = table.wavelengths();
+        assert_eq!((table.len(), wavelengths.len(), table.kind()), (2600, 161, Some(SpectrumKind::Illuminant)));
+        assert_eq!((wavelengths[0], wavelengths[160]), (300.0, 1100.0));
+        let mean = |i| table.spectrum(i).iter().sum::<f64>() / 161.0;
+        assert!((0..2600).all(|i| mean(i) > 0.0));
     }
 
     /// Values that stand in the published tables.

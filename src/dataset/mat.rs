@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], variable: Option<&str>) -> Result<
 }
 
 /// Every real numeric matrix of the file, in order.
-fn matrices(path: &Path, bytes: &[u8]) -> Result<Vec<Matrix>, DatasetError> {
+pub(super) fn matrices(path: &Path, bytes: &[u8]) -> Result<Vec<Matrix>, DatasetError> {
     let failed = |reason: &str| DatasetError::Mat { path: path.to_owned(), reason: reason.to_owned() };
     let little_endian = endianness(bytes).map_err(failed)?;
     let word = |at: &[u8], i: usize| -> Option<u32> {

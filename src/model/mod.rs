@@ -12,9 +12,10 @@ use serde::{Deserialize, Serialize};
 mod builtin;
 mod fit;
 
+pub use builtin::BuiltinModel;
 pub use fit::{Fit, FitError};
 
-use crate::dataset::SpectrumKind;
+use crate::dataset::{SpectrumKind, Table};
 use crate::grid::{Grid, GridError};
 
 /// The most components a model may have: what the counter layout of a draw has blocks for (see
@@ -76,6 +77,8 @@ pub struct ModelParts {
 pub enum ModelError {
     #[error("cannot read model {path}: {source}")]
     Read { path: String, source: std::io::Error },
+    #[error("{path} holds measured data, not a model: fit a model to it first")]
+    Data { path: String },
     #[error("{path} is not a model file: {source}")]
     Json { path: String, source: serde_json::Error },
     #[error("{path} is a model of schema {found}, and this program reads up to {SCHEMA}: update spectroll")]
@@ -106,6 +109,13 @@ pub enum ModelError {
     NotPositive { smallest: f64, largest: f64 },
     #[error("there is no built-in model {name:?}; there are {}", Model::BUILTIN.join(", "))]
     NoBuiltin { name: String },
+    #[error(
+        "the data of {name} reach from {first} to {last} nm, which does not cover the grid {grid}: choose a grid within it, \
+         or fit a model to other data"
+    )]
+    BuiltinRange { name: String, first: f64, last: f64, grid: Grid },
+    #[error("{name} cannot be fitted at {grid}: {source}")]
+    BuiltinFit { name: String, grid: Grid, source: FitError },
 }
 
 impl Model {
@@ -147,6 +157,9 @@ impl Model {
     /// Reads a model file.
     pub fn load(path: &Path) -> Result<Model, ModelError> {
         let name = path.display().to_string();
+        if Table::may_open(path) {
+            return Err(ModelError::Data { path: name });
+        }
         let text =
             fs::read_to_string(path).map_err(|source| ModelError::Read { path: name.clone(), source })?;
         Model::from_json(&name, &text)

@@ -9,7 +9,7 @@ use toml::de::DeTable;
 
 use crate::colorimetry;
 use crate::dataset::{Dataset, DatasetError, Table};
-use crate::grid::Extrapolation;
+use crate::grid::{Extrapolation, Grid};
 use crate::model::Model;
 use crate::program::Bounds;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
@@ -66,7 +66,7 @@ impl Scene {
         let table = DeTable::parse(text).map_err(|e| {
             error(e.span(), None, String::new(), SceneErrorKind::Syntax(e.message().replace('\n', "; ")))
         })?;
-        let file = Reader { folder, models: HashMap::new() }
+        let file = Reader { folder, models: HashMap::new(), grid: None }
             .scene(table.get_ref())
             .map_err(|wrong| error(Some(wrong.span), wrong.group, wrong.key, *wrong.problem))?;
         file.builder.checked().map_err(|fault| {
@@ -105,6 +105,8 @@ struct Reader<'a> {
     folder: &'a Path,
     /// Those that were read.
     models: HashMap<String, Model>,
+    /// The wavelengths of the scene, where it has them; built-in models are fitted at these.
+    grid: Option<Grid>,
 }
 
 impl Reader<'_> {
@@ -116,6 +118,7 @@ impl Reader<'_> {
         }
         if let Some(entry) = section.get("wavelengths") {
             let grid = entry.text()?.parse().map_err(|e| entry.wrong(SceneErrorKind::Wavelengths(e)))?;
+            self.grid = Some(grid);
             builder = builder.wavelengths(grid);
         }
         let mut groups = Vec::new();
@@ -221,7 +224,7 @@ impl Reader<'_> {
         }
         let path = self.folder.join(name);
         let model = if Model::BUILTIN.contains(&name) {
-            Model::builtin(name)
+            self.grid.map_or_else(|| Model::builtin(name), |grid| Model::builtin_at(name, grid))
         } else if path.is_file() {
             Model::load(&path)
         } else {
