@@ -55,7 +55,7 @@ struct Shares {
     parts: Vec<Share>,
 }
 
-/// The rates of one engine, million draws a second.
+/// The rates of one engine.
 #[derive(Serialize)]
 struct Rates {
     recipe: String,
@@ -65,6 +65,12 @@ struct Rates {
     bytes_per_draw: u64,
     acceptance: f64,
     draws_per_run: u64,
+    draws_per_second: Spread,
+}
+
+/// The middle and the ends of what several runs gave.
+#[derive(Clone, Copy, Serialize)]
+struct Spread {
     median: f64,
     least: f64,
     most: f64,
@@ -96,7 +102,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         for (name, recipe) in &recipes {
             let rates = measure(&engine, name, recipe, arguments.runs, seconds)?;
             if !arguments.json {
-                let Rates { median, least, most, draws_per_run, engine, .. } = &rates;
+                let Rates { draws_per_second: rate, draws_per_run, engine, .. } = &rates;
+                let [median, least, most] = [rate.median, rate.least, rate.most].map(|rate| rate / 1e6);
                 let mut out = std::io::stdout();
                 match arguments.costs {
                     true => writeln!(out, "  {name:width$}  {median:7.2} ({least:.2} to {most:.2})")?,
@@ -196,7 +203,7 @@ fn measure(engine: &Engine, name: &str, recipe: &Recipe, runs: u32, seconds: f64
     let trial = 200_000;
     let count = (trial as f64 * seconds / time(trial)?).max(1.0) as u64;
     let mut rates =
-        (0..runs).map(|_| Ok(count as f64 / time(count)? / 1e6)).collect::<anyhow::Result<Vec<f64>>>()?;
+        (0..runs).map(|_| Ok(count as f64 / time(count)?)).collect::<anyhow::Result<Vec<f64>>>()?;
     rates.sort_by(f64::total_cmp);
     Ok(Rates {
         recipe: name.trim().to_owned(),
@@ -206,8 +213,10 @@ fn measure(engine: &Engine, name: &str, recipe: &Recipe, runs: u32, seconds: f64
         bytes_per_draw: recipe.formats().iter().map(|format| format.bytes(4) / 4).sum(),
         acceptance: recipe.acceptance(),
         draws_per_run: count,
-        median: rates[rates.len() / 2],
-        least: rates[0],
-        most: rates[rates.len() - 1],
+        draws_per_second: Spread {
+            median: rates[rates.len() / 2],
+            least: rates[0],
+            most: rates[rates.len() - 1],
+        },
     })
 }

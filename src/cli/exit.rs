@@ -3,7 +3,7 @@
 use spectroll::export::{ExportError, SelectionError};
 use spectroll::output::OutputError;
 use spectroll::scene::SceneError;
-use spectroll::{DatasetError, EngineError, FitError, ModelError, RecipeError, WgslError};
+use spectroll::{DatasetError, EngineError, FitError, ModelError, Quantity, RecipeError, WgslError};
 
 use super::interrupt::Interrupted;
 
@@ -33,7 +33,10 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
     ) {
         2 // nothing that was read is wrong: the grid was asked for
     } else if error.is::<DatasetError>() || error.is::<FitError>() || error.is::<ModelError>() {
-        4
+        match error.downcast_ref() {
+            Some(ModelError::BuiltinRange { .. }) => 2,
+            _ => 4,
+        }
     } else if error.is::<Unverified>() {
         5
     } else if error.is::<RecipeError>()
@@ -98,11 +101,49 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             _ => "",
         };
     }
+    if let Some(error) = error.downcast_ref::<RecipeError>() {
+        return of_recipe(error);
+    }
+    if let Some(error) = error.downcast_ref::<FitError>() {
+        return match error {
+            FitError::Power { .. } => " (--normalize none)",
+            FitError::NotReflectances { .. } => " (--scale 0.01, or --kind illuminant)",
+            FitError::TooFewSpectra { .. } | FitError::Rank { .. } | FitError::Components(_) | FitError::Share(_) => {
+                " (-k)"
+            }
+            _ => "",
+        };
+    }
     match error.downcast_ref::<DatasetError>() {
         Some(DatasetError::NoWavelengths { .. }) => " (--wavelengths)",
         Some(DatasetError::Range { .. }) => " (--wavelengths, --extrapolate)",
-        _ if matches!(error.downcast_ref(), Some(FitError::Power { .. })) => " (--normalize none)",
+        _ if matches!(error.downcast_ref(), Some(ModelError::BuiltinRange { .. })) => {
+            " (--wavelengths; `spectroll fit` takes other data)"
+        }
         _ if matches!(error.downcast_ref(), Some(EngineError::NoAdapters)) => " (--engine cpu)",
+        _ => "",
+    }
+}
+
+fn of_recipe(error: &RecipeError) -> &'static str {
+    match error {
+        RecipeError::Pointless { setting: "an illuminant for reflectances", .. } => {
+            ": --illuminant needs --quantities xyz or linear_srgb"
+        }
+        RecipeError::Pointless { setting: "a scale of tristimulus values", .. } => {
+            ": --xyz-scale needs --quantities xyz or linear_srgb"
+        }
+        RecipeError::Pointless { .. } => ": --bounds needs --lrv",
+        RecipeError::Quantity { quantity: Quantity::Intensity, .. } => ": --quantities intensity needs --intensity",
+        RecipeError::Quantity { .. } | RecipeError::Nothing => " (--quantities)",
+        RecipeError::Lrv(_) | RecipeError::LrvOfIlluminant | RecipeError::UnreachableLrv { .. } => " (--lrv)",
+        RecipeError::Intensity(_)
+        | RecipeError::IntensityRange { .. }
+        | RecipeError::IntensityOfReflectance
+        | RecipeError::NoPowers => " (--intensity)",
+        RecipeError::CovarianceScale(_) => " (--cov-scale)",
+        RecipeError::NoCover { .. } => " (--proposal plain)",
+        RecipeError::MaxAttempts(_) | RecipeError::Hopeless { .. } => " (--max-attempts)",
         _ => "",
     }
 }

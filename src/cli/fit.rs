@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use spectroll::output::write_file;
+use spectroll::suggestion::closest;
 use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, Grid, Model, Normalization, SpectrumKind, Table};
 
 use super::exit::Usage;
@@ -20,15 +21,18 @@ pub(crate) struct Arguments {
     /// Files of spectra, or munsell, vrhel, granada
     #[arg(required = true, value_name = "FILE")]
     files: Vec<String>,
-    /// The number of components
-    #[arg(short = 'k', long, default_value_t = 6, value_name = "K")]
-    components: usize,
+    /// The number of components, or the share of the variance that they must explain, as in 99.9%
+    #[arg(short = 'k', long, default_value = "6", value_name = "K", value_parser = components)]
+    components: Components,
     /// Kind of the spectra [default: as the name of the variable says: sur_X, spd_X, daylightX]
     #[arg(long, value_enum)]
     kind: Option<SpectrumKind>,
     /// The wavelengths, start:step:stop in nm [default: 400:10:700]
     #[arg(long, value_name = "GRID")]
     wavelengths: Option<Grid>,
+    /// Multiply the data by this: 0.01 makes reflectances of percentages
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", value_parser = factor)]
+    scale: f64,
     /// Divide each spectrum by this first [default: mean for illuminants, none for reflectances]
     #[arg(long, value_enum)]
     normalize: Option<Normalization>,
@@ -43,15 +47,48 @@ pub(crate) struct Arguments {
     force: bool,
 }
 
+/// How large a model should be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Components {
+    Count(usize),
+    /// As many as explain this share of the variance.
+    Share(f64),
+}
+
+fn components(text: &str) -> Result<Components, String> {
+    let parsed = match text.strip_suffix('%') {
+        Some(percent) => percent.trim().parse().ok().map(|percent: f64| Components::Share(percent / 100.0)),
+        None => text.parse().ok().map(Components::Count),
+    };
+    parsed.ok_or_else(|| "expected a number of components, or a share of the variance as in 99.9%".to_owned())
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    let factor = text.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0);
+    factor.ok_or_else(|| "expected a number above 0".to_owned())
+}
+
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    if let Some(extension) = arguments.output.extension().filter(|e| !e.eq_ignore_ascii_case("json")) {
+        let name = arguments.output.with_extension("json");
+        return Err(Usage(format!(
+            "a model is a JSON file, not .{}: pass -o {}",
+            extension.display(),
+            name.display()
+        ))
+        .into());
+    }
     let tables = arguments
         .files
         .iter()
-        .map(|file| table(file, arguments.wavelengths))
+        .map(|file| Ok(table(file, arguments.wavelengths)?.scaled(arguments.scale)))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let kind = kind(arguments, &tables)?;
     let data = Dataset::new(&tables, arguments.wavelengths.unwrap_or(Grid::DEFAULT), arguments.extrapolate)?;
-    let mut fit = Fit::new(kind).components(arguments.components);
+    let mut fit = match arguments.components {
+        Components::Count(components) => Fit::new(kind).components(components),
+        Components::Share(share) => Fit::new(kind).explain(share),
+    };
     if let Some(normalize) = arguments.normalize {
         fit = fit.normalization(normalize);
     }
@@ -75,7 +112,7 @@ fn report(model: &Model, data: &Dataset, path: &Path) {
 }
 
 /// The table of a built-in name, a file, or file:variable; at these wavelengths where the file does not say.
-fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
+pub(super) fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
     if let Some(builtin) = BuiltinTable::named(name) {
         return Ok(builtin.table());
     }
@@ -83,7 +120,23 @@ fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
         Some((file, variable)) if !Path::new(name).exists() => (file, Some(variable)),
         _ => (name, None),
     };
+    if !Path::new(path).exists() {
+        return Err(Usage(no_data(name)).into());
+    }
     Ok(Table::open_on(Path::new(path), variable, grid)?)
+}
+
+/// Says what a name that is no file's may have meant.
+fn no_data(name: &str) -> String {
+    if Model::BUILTIN.contains(&name) {
+        return format!(
+            "{name} is a model, fitted already, and measured spectra are wanted here; `spectroll sample {name} --wavelengths \
+             START:STEP:STOP` fits it at another grid"
+        );
+    }
+    let tables = BuiltinTable::ALL.iter().map(|table| table.name());
+    let meant = closest(name, tables).map_or(String::new(), |meant| format!(", did you mean {meant}?"));
+    format!("{name:?} is neither a file nor a built-in table (munsell, vrhel){meant}")
 }
 
 /// Kind of the spectra: as asked, else as their names say, if those agree.

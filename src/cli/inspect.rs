@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use spectroll::{CoverSize, Grid, Model, Normalization, Recipe, RecipeError};
+use spectroll::{Bounds, CoverSize, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind};
 
 use super::options::RecipeArguments;
 use super::parse::grouped;
@@ -82,7 +82,7 @@ fn table(name: &str, model: &Model, recipe: &Result<Recipe, RecipeError>) -> Str
     }
     match recipe {
         Ok(recipe) => {
-            line(&mut text, "probability", &format!("{} (estimated)", share(recipe.probability())));
+            line(&mut text, "accepted", &accepted(recipe));
             line(&mut text, "candidates", &candidates(recipe));
         }
         Err(e) => line(&mut text, "refused", &e.to_string()),
@@ -145,11 +145,19 @@ fn candidates(recipe: &Recipe) -> String {
     }
 }
 
-fn share(probability: f64) -> String {
-    match probability {
-        0.01.. => format!("{:.2} % of the model's spectra are accepted", 100.0 * probability),
-        _ => format!("{probability:.3e} of the model's spectra are accepted"),
-    }
+/// Share of the model's Gaussian that is accepted, and the rule.
+fn accepted(recipe: &Recipe) -> String {
+    let rule = match (recipe.model().kind(), recipe.settings().lrv, recipe.settings().bounds) {
+        (SpectrumKind::Illuminant, ..) => "power above 0 in every band",
+        (SpectrumKind::Reflectance, None, _) | (_, _, Bounds::Base) => "0 < reflectance < 1 in every band",
+        (_, _, Bounds::Scaled) => "0 < scaled reflectance < 1 in every band",
+        (_, _, Bounds::Both) => "0 < reflectance < 1 in every band, before and after scaling",
+    };
+    let share = match recipe.probability() {
+        probability @ 0.01.. => format!("{:.2} %", 100.0 * probability),
+        probability => format!("{probability:.3e}"),
+    };
+    format!("{share} of the model's candidates, by an estimate ({rule})")
 }
 
 /// A row a component.

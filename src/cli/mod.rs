@@ -33,13 +33,14 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use spectroll::output::IfExists;
-use spectroll::{Grid, Model};
+use spectroll::suggestion::closest;
+use spectroll::{BuiltinTable, Grid, Model, ModelError};
 
 use exit::Usage;
 
 /// Draws random, physically valid natural spectra on the GPU.
 #[derive(Parser)]
-#[command(version, after_help = EXAMPLES)]
+#[command(version = version(), after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -72,7 +73,7 @@ enum Command {
     Verify(verify::VerifyArguments),
     Merge(verify::MergeArguments),
     Inspect(inspect::Arguments),
-    #[command(alias = "list")]
+    #[command(visible_alias = "list")]
     Models(models::Arguments),
     Shader(shader::Arguments),
     Adapters(adapters::Arguments),
@@ -115,18 +116,61 @@ fn run(command: Command) -> anyhow::Result<()> {
     }
 }
 
+/// The version, and the commit where the build knew it.
+fn version() -> String {
+    let commit = option_env!("SPECTROLL_COMMIT").map_or(String::new(), |commit| format!(" ({commit})"));
+    env!("CARGO_PKG_VERSION").to_owned() + &commit
+}
+
 /// The model of a name: a built-in one, or a file.
 fn model(name: &str) -> anyhow::Result<Model> {
+    model_at(name, None)
+}
+
+/// The model of a name, where a built-in one is fitted at the grid that is asked for.
+fn model_at(name: &str, grid: Option<Grid>) -> anyhow::Result<Model> {
     if Model::BUILTIN.contains(&name) {
-        return Ok(Model::builtin(name)?);
+        return Ok(match grid {
+            Some(grid) => Model::builtin_at(name, grid)?,
+            None => Model::builtin(name)?,
+        });
     }
     if !Path::new(name).exists() {
-        let builtin = Model::BUILTIN.join(", ");
+        anyhow::bail!(Usage(no_model(name)));
+    }
+    let model = Model::load(Path::new(name)).map_err(|error| match error {
+        ModelError::Data { .. } => {
+            let kind = if has_extension(name, "mat") { "a MATLAB file of data" } else { "a file of data" };
+            let advice = format!("{name} is {kind}: fit a model to it first: spectroll fit {name} -o MODEL.json");
+            anyhow::Error::from(error).context(advice)
+        }
+        other => other.into(),
+    })?;
+    if let Some(grid) = grid.filter(|grid| *grid != model.grid()) {
         anyhow::bail!(Usage(format!(
-            "{name:?} is neither a file nor a built-in model ({builtin}); `spectroll fit` makes models"
+            "--wavelengths {grid} is for built-in models, and the grid of {name} is {}: make another with `spectroll fit \
+             --wavelengths {grid}`",
+            model.grid()
         )));
     }
-    Ok(Model::load(Path::new(name))?)
+    Ok(model)
+}
+
+/// What a name that is no model's may have meant.
+fn no_model(name: &str) -> String {
+    let builtin = Model::BUILTIN.join(", ");
+    let meant = match (BuiltinTable::named(name), closest(name, Model::BUILTIN)) {
+        (Some(BuiltinTable::Munsell | BuiltinTable::Vrhel), _) => Some("munsell-vrhel".to_owned()),
+        (_, None) if closest(name, ["munsell", "vrhel"]).is_some() => Some("munsell-vrhel".to_owned()),
+        (_, closest) => closest,
+    };
+    let meant = meant.map_or(String::new(), |meant| format!(", did you mean {meant}?"));
+    let end = if meant.is_empty() { "; `spectroll fit` makes models" } else { "" };
+    format!("{name:?} is neither a file nor a built-in model ({builtin}){meant}{end}")
+}
+
+fn has_extension(path: impl AsRef<Path>, extension: &str) -> bool {
+    path.as_ref().extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
 /// The same, where a built-in model may be asked for at other wavelengths than its own.

@@ -48,7 +48,10 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Table, DatasetError> {
         return Err(DatasetError::NoSpectra { name: format!("{path:?}") });
     };
     let spectra = DMatrix::from_row_slice(wavelengths.len(), columns - 1, &rows);
-    Table::from_columns(&format!("{path:?}"), wavelengths, spectra)
+    Table::from_columns(&format!("{path:?}"), wavelengths, spectra).map_err(|error| match error {
+        DatasetError::Wavelengths { name, source } => DatasetError::FirstColumn { name, source },
+        other => other,
+    })
 }
 
 /// The separator of the first line that is not a comment.
@@ -87,6 +90,7 @@ mod tests {
             ("400,0.1\n410,NaN\n", "spectrum 1 of \"x.csv\": the value at 410 nm is NaN"),
             ("400,0.1\n410,inf\n", "the value at 410 nm is inf"),
             ("410,0.1\n400,0.2\n", "number 2 is 400 nm after 410 nm"),
+            ("0,0.1\n5,0.2\n", "the first column must hold the wavelengths: are the spectra in rows?"),
             ("400 0.1\n410 0.2\n", "separated by commas"),
             ("nm,a\n", "holds no spectra"),
             ("# nothing\n", "holds no spectra"),

@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::grid::{self, Extrapolation, Grid, GridError, Spline};
 pub use builtin::BuiltinTable;
+pub(crate) use builtin::daylights;
 
 /// Limit on the bytes read of a file, and on those that a compressed file may unpack to: 512 MiB, 67 million values.
 const MAX_BYTES: u64 = 512 << 20;
@@ -79,6 +80,8 @@ pub enum DatasetError {
         "{name}: {source} (text files have wavelengths in nm in their first column, and a spectrum in each other)"
     )]
     Wavelengths { name: String, source: GridError },
+    #[error("{name}: {source}; the first column must hold the wavelengths: are the spectra in rows?")]
+    FirstColumn { name: String, source: GridError },
     #[error(
         "{name}: {values} values in spectrum {spectrum}, but {wavelengths} wavelengths: give one value for each"
     )]
@@ -167,6 +170,18 @@ impl Table {
             (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy());
         table.source = table.name.replace(&format!("{full:?}"), &file);
         Ok(table)
+    }
+
+    /// Whether the name of a file is that of a table, by its extension.
+    pub fn may_open(path: &Path) -> bool {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        matches!(extension.as_str(), "mat" | "h5" | "hdf5" | "npy" | "csv" | "tsv" | "txt")
+    }
+
+    /// Spectra multiplied by `factor`: 0.01 makes reflectances of percentages.
+    pub fn scaled(mut self, factor: f64) -> Table {
+        self.spectra *= factor;
+        self
     }
 
     /// Name of the table in messages.

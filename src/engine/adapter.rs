@@ -81,13 +81,21 @@ pub(super) fn best(which: Wanted) -> Result<Option<wgpu::Adapter>, EngineError> 
 /// Finds the adapter with an index, or the one whose name holds a text.
 pub(super) fn find(wanted: &str) -> Result<wgpu::Adapter, EngineError> {
     let all = enumerate();
-    let holds =
-        |adapter: &wgpu::Adapter| adapter.get_info().name.to_lowercase().contains(&wanted.to_lowercase());
-    let index = wanted.parse().ok().filter(|&index: &usize| index < all.len());
-    let position = index.or_else(|| all.iter().position(holds)); // 4090 may be part of a name
-    let missing =
-        || EngineError::NoAdapter { wanted: wanted.to_owned(), found: all.iter().map(Adapter::of).collect() };
-    Ok(all[position.ok_or_else(missing)?].clone())
+    let found: Vec<_> = all.iter().map(Adapter::of).collect();
+    match position(wanted, &found) {
+        Some(position) => Ok(all[position].clone()),
+        None => Err(EngineError::NoAdapter { wanted: wanted.to_owned(), found }),
+    }
+}
+
+/// Where in a list the adapter is that is wanted. Digits are an index and nothing else: names are full of version
+/// numbers, so that "5" would find "LLVM 15.0.6".
+fn position(wanted: &str, all: &[Adapter]) -> Option<usize> {
+    let wanted = wanted.trim().to_lowercase();
+    if !wanted.is_empty() && wanted.bytes().all(|b| b.is_ascii_digit()) {
+        return wanted.parse().ok().filter(|&index| index < all.len());
+    }
+    all.iter().position(|adapter| adapter.name.to_lowercase().contains(&wanted))
 }
 
 fn enumerate() -> Vec<wgpu::Adapter> {
@@ -106,4 +114,25 @@ fn enumerate() -> Vec<wgpu::Adapter> {
         flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
     };
     pollster::block_on(instance.enumerate_adapters(backends)).into_iter().filter(compute).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_are_an_index_and_text_is_part_of_a_name() {
+        let adapter = |name: &str| Adapter {
+            name: name.to_owned(),
+            backend: "vulkan".to_owned(),
+            kind: "software".to_owned(),
+            driver: String::new(),
+            int64: true,
+        };
+        let all = [adapter("NVIDIA GeForce RTX 4090"), adapter("llvmpipe (LLVM 15.0.6, 256 bits)")];
+        assert_eq!(["0", "1", " 1 "].map(|wanted| position(wanted, &all)), [Some(0), Some(1), Some(1)]);
+        assert_eq!(["5", "15", "4090", "99999999999999999999"].map(|w| position(w, &all)), [None; 4]);
+        assert_eq!(["RTX 4090", "LLVM 15", "nonesuch"].map(|w| position(w, &all)), [Some(0), Some(1), None]);
+        assert_eq!(position("0", &[]), None);
+    }
 }

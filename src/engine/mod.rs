@@ -46,7 +46,7 @@ pub enum EngineChoice {
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum EngineError {
-    #[error("no adapter {wanted:?}; {}", available(found))]
+    #[error("no adapter {}; {}", named(wanted), available(found))]
     NoAdapter { wanted: String, found: Vec<Adapter> },
     #[error(
         "no graphics adapter was found: install a Vulkan driver (Debian: mesa-vulkan-drivers), or draw on the CPU"
@@ -70,9 +70,15 @@ pub enum EngineError {
     ExhaustedInScene { group: String, scene: u64, element: u64, attempts: u32 },
 }
 
+/// An index as it stands, and a name in quotes.
+fn named(wanted: &str) -> String {
+    if wanted.bytes().all(|b| b.is_ascii_digit()) { wanted.to_owned() } else { format!("{wanted:?}") }
+}
+
 fn available(found: &[Adapter]) -> String {
     match found {
         [] => "this machine has none".to_owned(),
+        [only] => format!("there is only 0: {only}"),
         all => {
             let lines = all.iter().enumerate().map(|(i, a)| format!("\n  {i}: {a}"));
             format!("there are:{}", lines.collect::<String>())

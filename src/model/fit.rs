@@ -19,8 +19,16 @@ use crate::model::{MAX_COMPONENTS, Model, ModelParts, Normalization};
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
     kind: SpectrumKind,
-    components: usize,
+    size: Size,
     normalization: Normalization,
+}
+
+/// Number of components to keep.
+#[derive(Clone, Copy, Debug)]
+enum Size {
+    Components(usize),
+    /// As many as explain at least this share of the variance.
+    Share(f64),
 }
 
 /// Error returned where a model cannot be fitted.
@@ -30,12 +38,14 @@ pub struct Fit {
 pub enum FitError {
     #[error("a model of {0} components: it needs at least 1 component, and has at most {MAX_COMPONENTS}")]
     Components(usize),
-    #[error("{components} components need at least {} spectra, and there are {spectra}: ask for fewer with -k", components + 1)]
+    #[error("a share of the variance of {0}: it must be above 0 and at most 1")]
+    Share(f64),
+    #[error("{components} components need at least {} spectra, and there are {spectra}: ask for fewer", components + 1)]
     TooFewSpectra { components: usize, spectra: usize },
     #[error("all {spectra} spectra are identical: there is no variation to model")]
     NoVariation { spectra: usize },
     #[error(
-        "the data have rank {rank}, which is less than {components} components: ask for -k {rank} or fewer"
+        "the data have rank {rank}, which is less than {components} components: ask for {rank} or fewer"
     )]
     Rank { components: usize, rank: usize },
     #[error(
@@ -43,8 +53,8 @@ pub enum FitError {
     )]
     Power { place: String, power: f64 },
     #[error(
-        "reflectances of {mean:.4} on average, where they are between 0 and 1: divide percents by 100, or fit these as \
-         illuminants"
+        "reflectances of {mean:.4} on average, where they are between 0 and 1: these look like percentages, so divide \
+         them by 100; or fit them as illuminants"
     )]
     NotReflectances { mean: f64 },
     #[error("the values are too large or too small to square in f64: rescale the data, or normalise")]
@@ -58,12 +68,18 @@ impl Fit {
             SpectrumKind::Illuminant => Normalization::Mean,
             SpectrumKind::Reflectance => Normalization::None,
         };
-        Fit { kind, components: 6, normalization }
+        Fit { kind, size: Size::Components(6), normalization }
     }
 
     /// Keeps `components` principal components (k).
     pub fn components(self, components: usize) -> Fit {
-        Fit { components, ..self }
+        Fit { size: Size::Components(components), ..self }
+    }
+
+    /// Keeps the least number of principal components that explain at least this share of the data's variance, from
+    /// 0 to 1.
+    pub fn explain(self, share: f64) -> Fit {
+        Fit { size: Size::Share(share), ..self }
     }
 
     /// Divides each spectrum by `normalization` first.
@@ -73,15 +89,17 @@ impl Fit {
 
     /// Fits the model.
     pub fn fit(&self, data: &Dataset) -> Result<Model, FitError> {
-        let k = self.components;
         let (bands, spectra) = data.spectra().shape();
-        if !(1..=MAX_COMPONENTS).contains(&k) {
-            return Err(FitError::Components(k));
+        let least = match self.size {
+            Size::Components(k) if !(1..=MAX_COMPONENTS).contains(&k) => return Err(FitError::Components(k)),
+            Size::Components(k) => k,
+            Size::Share(share) if !(share > 0.0 && share <= 1.0) => return Err(FitError::Share(share)),
+            Size::Share(_) => 1,
+        };
+        if spectra < least + 1 {
+            return Err(FitError::TooFewSpectra { components: least, spectra });
         }
-        if spectra < k + 1 {
-            return Err(FitError::TooFewSpectra { components: k, spectra });
-        }
-        let (mut centred, powers) = self.normalized(data)?;
+        let (mut centred, powers) = self.normalization.divide(data)?;
         let mean = centred.mean();
         if self.kind == SpectrumKind::Reflectance && mean.is_finite() && mean > 1.0 {
             return Err(FitError::NotReflectances { mean });
@@ -113,10 +131,15 @@ impl Fit {
         // As MATLAB's and NumPy's rank: what rounding alone can leave is not a component.
         let noise = bands.max(spectra) as f64 * f64::EPSILON * singular[0].max(size);
         let rank = singular.iter().filter(|&&s| s > noise).count();
-        if k > rank {
-            return Err(FitError::Rank { components: k, rank });
-        }
         let total: f64 = singular.iter().map(|s| s * s).sum();
+        let k = match self.size {
+            Size::Components(k) if k > rank => return Err(FitError::Rank { components: k, rank }),
+            Size::Components(k) => k,
+            Size::Share(share) => enough(&singular.as_slice()[..rank], share * total),
+        };
+        if k > MAX_COMPONENTS {
+            return Err(FitError::Components(k));
+        }
         // In the principal frame the weights have mean zero and a diagonal covariance (eq. 4, with 1/M).
         let variances = singular.rows(0, k).map(|s| s * s / spectra as f64);
         Ok(Model::new(ModelParts {
@@ -134,13 +157,17 @@ impl Fit {
         .expect("singular vectors are orthonormal and variances are not negative"))
     }
 
-    /// The spectra, a column each, divided as `normalization` says (eq. 1), and their divisors.
-    fn normalized(&self, data: &Dataset) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
+}
+
+impl Normalization {
+    /// Divides the spectra, a column each (eq. 1), and returns them with their divisors: none for
+    /// [`None`](Normalization::None).
+    pub fn divide(self, data: &Dataset) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
         let mut spectra = data.spectra().clone();
         let mut powers = Vec::new();
         for (i, mut spectrum) in spectra.column_iter_mut().enumerate() {
             let mean = spectrum.mean();
-            let divisor = match self.normalization {
+            let divisor = match self {
                 Normalization::None => continue,
                 Normalization::Mean => mean,
                 Normalization::Integral => spectrum.sum() * data.grid().step(),
@@ -153,6 +180,15 @@ impl Fit {
         }
         Ok((spectra, powers))
     }
+}
+
+/// How many of these values, in order, have squares that sum to `wanted`; all of them where rounding leaves less.
+fn enough(singular: &[f64], wanted: f64) -> usize {
+    let sums = singular.iter().scan(0.0, |sum, s| {
+        *sum += s * s;
+        Some(*sum)
+    });
+    (sums.take_while(|&sum| sum < wanted).count() + 1).min(singular.len())
 }
 
 /// The singular values in falling order, and the vectors in band space that belong to them, a row each, with the
@@ -182,7 +218,7 @@ mod tests {
         let table = Table::new("percents.csv", vec![400.0, 410.0, 420.0], &percents).unwrap();
         let data = Dataset::new(&[table], Grid::new(400.0, 10.0, 3).unwrap(), Extrapolation::Error).unwrap();
         let message = Fit::new(SpectrumKind::Reflectance).components(2).fit(&data).unwrap_err().to_string();
-        assert!(message.contains("divide percents by 100"), "{message}");
+        assert!(message.contains("look like percentages"), "{message}");
         assert!(Fit::new(SpectrumKind::Illuminant).components(2).fit(&data).is_ok());
     }
 

@@ -15,7 +15,7 @@ mod fit;
 pub use builtin::BuiltinData;
 pub use fit::{Fit, FitError};
 
-use crate::dataset::SpectrumKind;
+use crate::dataset::{SpectrumKind, Table};
 use crate::grid::{Grid, GridError};
 
 /// The most components a model may have: what the counter layout of a draw has blocks for (see
@@ -77,6 +77,8 @@ pub struct ModelParts {
 pub enum ModelError {
     #[error("cannot read model {path}: {source}")]
     Read { path: String, source: std::io::Error },
+    #[error("{path} holds measured data, not a model: fit a model to it first")]
+    Data { path: String },
     #[error("{path} is not a model file: {source}")]
     Json { path: String, source: serde_json::Error },
     #[error("{path} is a model of schema {found}, and this program reads up to {SCHEMA}: update spectroll")]
@@ -155,6 +157,9 @@ impl Model {
     /// Reads a model file.
     pub fn load(path: &Path) -> Result<Model, ModelError> {
         let name = path.display().to_string();
+        if Table::may_open(path) {
+            return Err(ModelError::Data { path: name });
+        }
         let text =
             fs::read_to_string(path).map_err(|source| ModelError::Read { path: name.clone(), source })?;
         Model::from_json(&name, &text)

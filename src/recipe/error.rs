@@ -10,9 +10,7 @@ use crate::quantity::Quantity;
 #[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum RecipeError {
-    #[error(
-        "a target luminous reflectance of {0}: it must be above 0 and below 1, which is a perfect white; the least is 1e-30"
-    )]
+    #[error("a target luminous reflectance of {}: {}", .0, not_an_lrv(*.0))]
     Lrv(f64),
     #[error("a target luminous reflectance belongs to reflectances, and this model is of illuminants")]
     LrvOfIlluminant,
@@ -58,7 +56,7 @@ pub enum RecipeError {
         "this model does not hold what its data were divided by: fit it again, normalized, or give intensities"
     )]
     NoPowers,
-    #[error("{quantity} cannot come out: {reason}")]
+    #[error("the quantity {quantity}: {reason}")]
     Quantity { quantity: Quantity, reason: &'static str },
     #[error("nothing is asked for: a recipe has at least one quantity")]
     Nothing,
@@ -84,7 +82,7 @@ pub enum RecipeError {
     Empty { wavelengths: Vec<f64> },
     #[error("{}", no_cover(*components))]
     NoCover { components: usize },
-    #[error("{setting} would change nothing without {needs}: leave it out, or ask for that")]
+    #[error("{setting} needs {needs}")]
     Pointless { setting: &'static str, needs: &'static str },
     #[error(
         "too few candidates would be accepted: {}",
@@ -100,10 +98,30 @@ fn hopeless(acceptance: f64, max_attempts: u32, remedy: &str) -> String {
     }
     let needed = (TOLERABLE_FAILURE.ln() / (-acceptance).ln_1p()).ceil();
     format!(
-        "an estimated {acceptance:.1e} of them, so that one draw in {:.1e} would fail in all its {max_attempts} attempts; \
-         allow at least {needed:.0} attempts, or {remedy}",
-        1.0 / failure(acceptance, max_attempts)
+        "about 1 draw in {} would find no acceptable spectrum in {max_attempts} {}; allow {needed:.0} attempts or more, \
+         or {remedy}",
+        one_in(1.0 / failure(acceptance, max_attempts)),
+        if max_attempts == 1 { "attempt" } else { "attempts" },
     )
+}
+
+/// A number of draws as people say it.
+fn one_in(draws: f64) -> String {
+    if draws < 1e6 { format!("{draws:.0}") } else { format!("{draws:.0e}") }
+}
+
+/// What is wrong with a target luminous reflectance: most that is above 1 was meant in percent.
+fn not_an_lrv(lrv: f64) -> String {
+    match lrv {
+        1.5..100.0 => format!("it is a fraction between 0 and 1 (a perfect white); did you mean {}?", rounded(lrv / 100.0)),
+        0.0..1.0 if lrv > 0.0 => "the least is 1e-30".to_owned(),
+        _ => "it is a fraction above 0 and below 1, which is a perfect white".to_owned(),
+    }
+}
+
+/// Without the rounding error of a division.
+fn rounded(value: f64) -> f64 {
+    (value * 1e12).round() / 1e12
 }
 
 fn no_cover(components: usize) -> String {
@@ -129,4 +147,27 @@ fn unreachable_xyz(xyz: [f64; 3], nearest: Option<[f64; 3]>) -> String {
 
 fn nanometres(wavelengths: &[f64]) -> String {
     wavelengths.iter().map(|w| format!("{w} nm")).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_luminous_reflectance_in_percent_is_told_from_others() {
+        let message = |lrv| RecipeError::Lrv(lrv).to_string();
+        assert!(message(40.0).ends_with("did you mean 0.4?"), "{}", message(40.0));
+        assert!(message(7.0).ends_with("did you mean 0.07?"), "{}", message(7.0));
+        assert!(message(1e-40).ends_with("the least is 1e-30"), "{}", message(1e-40));
+        for lrv in [0.0, -1.0, 1.0, 100.0, f64::NAN] {
+            assert!(message(lrv).ends_with("below 1, which is a perfect white"), "{}", message(lrv));
+        }
+    }
+
+    #[test]
+    fn a_hopeless_recipe_says_how_many_draws_fail_and_what_would_do() {
+        let error = RecipeError::Hopeless { acceptance: 0.75, max_attempts: 1 }.to_string();
+        assert!(error.contains("about 1 draw in 4 would find no acceptable spectrum in 1 attempt;"), "{error}");
+        assert!(error.contains("allow 20 attempts or more"), "{error}");
+    }
 }

@@ -53,11 +53,11 @@ pub(crate) fn outputs(
     let has_scaled = quantities.iter().any(|q| matches!(q, Quantity::Xyz | Quantity::LinearSrgb));
     if asked.illuminant.is_some() && !(has_colours && model.kind() == SpectrumKind::Reflectance) {
         let (setting, needs) =
-            ("an illuminant to see surfaces under", "XYZ, chromaticity or linear sRGB of reflectances");
+            ("an illuminant for reflectances", "the quantity xyz, chromaticity or linear_srgb of reflectances");
         return Err(RecipeError::Pointless { setting, needs });
     }
     if asked.xyz_scale.is_some() && !(has_scaled && model.kind() == SpectrumKind::Illuminant) {
-        let (setting, needs) = ("a scale of tristimulus values", "XYZ or linear sRGB of illuminants");
+        let (setting, needs) = ("a scale of tristimulus values", "the quantity xyz or linear_srgb of illuminants");
         return Err(RecipeError::Pointless { setting, needs });
     }
     let output = |quantity| {
@@ -128,7 +128,7 @@ fn source(
         Quantity::Intensity => match (&program.intensity, asked.fixed) {
             (Some(_), _) => Source::Intensity,
             (None, Some(intensity)) => Source::Map(Affine::constant(intensity, k), Unit::One),
-            (None, None) => return Err(unless("the recipe has no intensity")),
+            (None, None) => return Err(unless("it needs an intensity, and the recipe has none")),
         },
     })
 }
