@@ -7,9 +7,10 @@ VENV := target/venv
 export XDG_RUNTIME_DIR ?= /tmp
 export SPECTROLL_PYTHON := $(abspath $(VENV))/bin/python
 
-# A million reflectances, and a picture of what they are drawn from.
+# A million reflectances, and a picture of what they are drawn from. Without the formats that cost time to build, which
+# `make test` and `cargo install --path .` have.
 demo:
-	cargo build --locked --release
+	cargo build --locked --release --no-default-features --features cli
 	target/release/spectroll sample munsell-vrhel -n 1000000 -o target/reflectances.npy --force
 	target/release/spectroll inspect munsell-vrhel -o target/munsell-vrhel.png --force
 
