@@ -210,7 +210,11 @@ fn impossible_and_hopeless_requests_are_refused() {
         ("munsell-vrhel -n 5 --lrv 0.6..0.2", 2, "the lower end comes first; did you mean 0.2..0.6?"),
         ("munsell-vrhel -n 5 --lrv 0.4..0.4", 2, "the ends are the same; did you mean 0.4?"),
         ("munsell-vrhel -n 5 --lrv bright", 2, "expected a number or LOW..HIGH, as in 0.4 or 0.2..0.6"),
-        ("munsell-vrhel -n 5 --lrv 0.2..0.995 --bounds scaled", 2, "upper end of target luminous reflectances"),
+        (
+            "munsell-vrhel -n 5 --lrv 0.2..0.995 --bounds scaled",
+            2,
+            "upper end of target luminous reflectances",
+        ),
         ("munsell-vrhel -n 5 --lrv 0.99 --bounds scaled --max-attempts 20", 2, "allow at least"),
         ("munsell-vrhel -n 5 --cov-scale -2", 2, "scale of -2: it must be finite and not negative"),
         ("munsell-vrhel -n 5 --cov-scale inf", 2, "scale of inf"),

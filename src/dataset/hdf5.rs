@@ -30,15 +30,16 @@ pub(super) fn matrices(path: &Path) -> Result<Matrices, DatasetError> {
             }
             return Err(DatasetError::TooLarge { path: path.to_owned() });
         };
+        let name = name.trim_start_matches('/').to_owned();
+        if name == matrix::COMMENT {
+            // MATLAB's text is numbers of 16 bits.
+            let text = set.read_numeric_as::<u16>().ok().and_then(|units| String::from_utf16(&units).ok());
+            matrices.kind = text.and_then(|text| matrix::kind(&text)).or(matrices.kind);
+            continue;
+        }
         // What is no number is somebody else's.
         let Ok(values) = set.read_numeric_as::<f64>() else { continue };
         left -= count;
-        let name = name.trim_start_matches('/').to_owned();
-        if name == matrix::COMMENT {
-            let units: Vec<u16> = values.iter().map(|&unit| unit as u16).collect();
-            matrices.kind = String::from_utf16(&units).ok().and_then(|text| matrix::kind(&text));
-            continue;
-        }
         let matrix = Matrix { name, rows, columns, values };
         // One matrix may have two names.
         let is_same = |m: &Matrix| m.rows == rows && m.columns == columns && m.values == matrix.values;

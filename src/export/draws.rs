@@ -61,7 +61,8 @@ impl<'a> DrawExport<'a> {
             kind: self.recipe.model().kind(),
             lrv: match self.recipe.settings().lrv {
                 Some(Lrv::Fixed(lrv)) => LrvLabel::Same(lrv),
-                None | Some(Lrv::Uniform(..)) => LrvLabel::None,
+                Some(Lrv::Uniform(..)) => LrvLabel::Field(Quantity::Lrv.name().to_owned()),
+                None => LrvLabel::None,
             },
         };
         let files = vec![("_model.json", self.recipe.model().to_json())];

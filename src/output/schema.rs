@@ -207,7 +207,7 @@ pub enum LrvLabel {
     None,
     /// One luminous reflectance for all spectra.
     Same(f64),
-    /// One for each spectrum, in the field of this name.
+    /// One for each spectrum, in the field of this name, where the data set has it.
     Field(String),
 }
 

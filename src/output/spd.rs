@@ -6,7 +6,7 @@
 //! second target of scene 12 is `target/scene-0012-luminance-0.4000-reflectance-002.spd`. What all scenes share is there
 //! once, without a number of a scene.
 //!
-//! Only the folders are synced to disk, and not each file, which would take a hundred times as long as writing it: after
+//! Only the folders are synced to disk, and not each file, which takes far longer than writing it: after
 //! a power cut within seconds of the end, files may be empty.
 
 use std::fmt::Write;
