@@ -1,8 +1,9 @@
 //! The fit of a [`Model`] to a [`Dataset`] (Singh et al. 2018, appendix, eq. 1-4 and 6-7): principal components by a
 //! singular value decomposition, in f64.
 
-use nalgebra::{DMatrix, DVector, SVD};
+use nalgebra::{DMatrix, DVector};
 
+use super::decomposition::Decomposition;
 use crate::dataset::{Dataset, SpectrumKind};
 use crate::model::{MAX_COMPONENTS, Model, ModelParts, Normalization};
 
@@ -57,6 +58,8 @@ pub enum FitError {
          them by 100; or fit them as illuminants"
     )]
     NotReflectances { mean: f64 },
+    #[error("the principal components of these data could not be found to 1e-10: please report the data")]
+    Decomposition,
     #[error("the values are too large or too small to square in f64: rescale the data, or normalise")]
     Scale,
 }
@@ -122,8 +125,10 @@ impl Fit {
         if !scale.is_finite() {
             return Err(FitError::Scale);
         }
-        let (singular, basis) = decompose(centred * scale);
-        let singular = singular / scale;
+        let Some(Decomposition { values, basis }) = Decomposition::of(&(centred * scale)) else {
+            return Err(FitError::Decomposition);
+        };
+        let singular = values / scale;
         let largest = singular[0] * singular[0];
         if largest == 0.0 || !largest.is_finite() {
             return Err(FitError::Scale);
@@ -182,27 +187,13 @@ impl Normalization {
     }
 }
 
-/// How many of these values, in order, have squares that sum to `wanted`; all of them where rounding leaves less.
+/// Number of these values, in order, whose squares sum to `wanted`; all of them where rounding leaves less.
 fn enough(singular: &[f64], wanted: f64) -> usize {
     let sums = singular.iter().scan(0.0, |sum, s| {
         *sum += s * s;
         Some(*sum)
     });
     (sums.take_while(|&sum| sum < wanted).count() + 1).min(singular.len())
-}
-
-/// The singular values in falling order, and the vectors in band space that belong to them, a row each, with the
-/// largest entry of each made positive: a decomposition leaves the signs open, and a fit must be reproducible.
-fn decompose(columns: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
-    let svd = SVD::new(columns, true, false); // sorts
-    let mut basis = svd.u.expect("it was asked for").transpose();
-    for mut vector in basis.row_iter_mut() {
-        let largest = vector.iter().copied().fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
-        if largest < 0.0 {
-            vector.neg_mut();
-        }
-    }
-    (svd.singular_values, basis)
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
 mod builtin;
+mod decomposition;
 mod fit;
 
 pub use builtin::BuiltinData;

@@ -32,16 +32,20 @@ impl Condition {
             return None;
         }
         let map = DMatrix::from_fn(3, k, |row, column| xyz.gain[column][row]);
-        let svd = map.svd(true, true);
-        let largest = svd.singular_values.max();
-        if largest == 0.0 || svd.singular_values.min() < NEGLIGIBLE * largest {
+        // Values without vectors: with them nalgebra's are wrong where rows are nearly alike.
+        let singular = map.singular_values();
+        let largest = singular.max();
+        if largest == 0.0 || singular.min() < NEGLIGIBLE * largest {
             return None;
         }
-        let rows = svd.v_t.clone().expect("it was asked for");
+        // A^T = Q R, so that A^+ = Q (R^T)^-1, and the columns of Q span what the rows of A do.
+        let qr = map.transpose().qr();
+        let (q, r) = (qr.q(), qr.r());
+        let inverse = r.solve_upper_triangular(&q.transpose())?.transpose();
         Some(Condition {
             at_zero: DVector::from_column_slice(&xyz.offset),
-            inverse: svd.pseudo_inverse(0.0).expect("both sides were asked for"),
-            free: complement(&rows),
+            inverse,
+            free: complement(&q.transpose()),
         })
     }
 
