@@ -108,9 +108,10 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
         return match error {
             FitError::Power { .. } => " (--normalize none)",
             FitError::NotReflectances { .. } => " (--scale 0.01, or --kind illuminant)",
-            FitError::TooFewSpectra { .. } | FitError::Rank { .. } | FitError::Components(_) | FitError::Share(_) => {
-                " (-k)"
-            }
+            FitError::TooFewSpectra { .. }
+            | FitError::Rank { .. }
+            | FitError::Components(_)
+            | FitError::Share(_) => " (-k)",
             _ => "",
         };
     }
@@ -134,7 +135,9 @@ fn of_recipe(error: &RecipeError) -> &'static str {
             ": --xyz-scale needs --quantities xyz or linear_srgb"
         }
         RecipeError::Pointless { .. } => ": --bounds needs --lrv",
-        RecipeError::Quantity { quantity: Quantity::Intensity, .. } => ": --quantities intensity needs --intensity",
+        RecipeError::Quantity { quantity: Quantity::Intensity, .. } => {
+            ": --quantities intensity needs --intensity"
+        }
         RecipeError::Quantity { .. } | RecipeError::Nothing => " (--quantities)",
         RecipeError::Lrv(_) | RecipeError::LrvOfIlluminant | RecipeError::UnreachableLrv { .. } => " (--lrv)",
         RecipeError::Intensity(_)

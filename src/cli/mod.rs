@@ -141,7 +141,8 @@ fn model_at(name: &str, grid: Option<Grid>) -> anyhow::Result<Model> {
     let model = Model::load(Path::new(name)).map_err(|error| match error {
         ModelError::Data { .. } => {
             let kind = if has_extension(name, "mat") { "a MATLAB file of data" } else { "a file of data" };
-            let advice = format!("{name} is {kind}: fit a model to it first: spectroll fit {name} -o MODEL.json");
+            let advice =
+                format!("{name} is {kind}: fit a model to it first: spectroll fit {name} -o MODEL.json");
             anyhow::Error::from(error).context(advice)
         }
         other => other.into(),

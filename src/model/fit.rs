@@ -45,9 +45,7 @@ pub enum FitError {
     TooFewSpectra { components: usize, spectra: usize },
     #[error("all {spectra} spectra are identical: there is no variation to model")]
     NoVariation { spectra: usize },
-    #[error(
-        "the data have rank {rank}, which is less than {components} components: ask for {rank} or fewer"
-    )]
+    #[error("the data have rank {rank}, which is less than {components} components: ask for {rank} or fewer")]
     Rank { components: usize, rank: usize },
     #[error(
         "{place}: its mean power is {power}, and only a positive one can be normalised; remove it, or fit without normalization"
@@ -161,7 +159,6 @@ impl Fit {
         })
         .expect("singular vectors are orthonormal and variances are not negative"))
     }
-
 }
 
 impl Normalization {

@@ -113,7 +113,10 @@ fn one_in(draws: f64) -> String {
 /// What is wrong with a target luminous reflectance: most that is above 1 was meant in percent.
 fn not_an_lrv(lrv: f64) -> String {
     match lrv {
-        1.5..100.0 => format!("it is a fraction between 0 and 1 (a perfect white); did you mean {}?", rounded(lrv / 100.0)),
+        1.5..100.0 => format!(
+            "it is a fraction between 0 and 1 (a perfect white); did you mean {}?",
+            rounded(lrv / 100.0)
+        ),
         0.0..1.0 if lrv > 0.0 => "the least is 1e-30".to_owned(),
         _ => "it is a fraction above 0 and below 1, which is a perfect white".to_owned(),
     }
@@ -167,7 +170,10 @@ mod tests {
     #[test]
     fn a_hopeless_recipe_says_how_many_draws_fail_and_what_would_do() {
         let error = RecipeError::Hopeless { acceptance: 0.75, max_attempts: 1 }.to_string();
-        assert!(error.contains("about 1 draw in 4 would find no acceptable spectrum in 1 attempt;"), "{error}");
+        assert!(
+            error.contains("about 1 draw in 4 would find no acceptable spectrum in 1 attempt;"),
+            "{error}"
+        );
         assert!(error.contains("allow 20 attempts or more"), "{error}");
     }
 }

@@ -52,12 +52,15 @@ pub(crate) fn outputs(
     // A chromaticity is the same in every scale.
     let has_scaled = quantities.iter().any(|q| matches!(q, Quantity::Xyz | Quantity::LinearSrgb));
     if asked.illuminant.is_some() && !(has_colours && model.kind() == SpectrumKind::Reflectance) {
-        let (setting, needs) =
-            ("an illuminant for reflectances", "the quantity xyz, chromaticity or linear_srgb of reflectances");
+        let (setting, needs) = (
+            "an illuminant for reflectances",
+            "the quantity xyz, chromaticity or linear_srgb of reflectances",
+        );
         return Err(RecipeError::Pointless { setting, needs });
     }
     if asked.xyz_scale.is_some() && !(has_scaled && model.kind() == SpectrumKind::Illuminant) {
-        let (setting, needs) = ("a scale of tristimulus values", "the quantity xyz or linear_srgb of illuminants");
+        let (setting, needs) =
+            ("a scale of tristimulus values", "the quantity xyz or linear_srgb of illuminants");
         return Err(RecipeError::Pointless { setting, needs });
     }
     let output = |quantity| {
