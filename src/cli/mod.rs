@@ -30,6 +30,7 @@ mod verify;
 
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use spectroll::output::IfExists;
@@ -40,7 +41,7 @@ use exit::Usage;
 
 /// Draws random, physically valid natural spectra on the GPU.
 #[derive(Parser)]
-#[command(version = version(), after_help = EXAMPLES)]
+#[command(version = VERSION.as_str(), after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -48,6 +49,12 @@ struct Arguments {
     #[arg(long, global = true, value_name = "FILE.toml")]
     config: Option<String>,
 }
+
+/// The version, and the commit where the build knew it.
+static VERSION: LazyLock<String> = LazyLock::new(|| match option_env!("SPECTROLL_COMMIT") {
+    Some(commit) => format!("{} ({commit})", env!("CARGO_PKG_VERSION")),
+    None => env!("CARGO_PKG_VERSION").to_owned(),
+});
 
 const EXAMPLES: &str = "\
 Examples:
@@ -116,12 +123,6 @@ fn run(command: Command) -> anyhow::Result<()> {
     }
 }
 
-/// The version, and the commit where the build knew it.
-fn version() -> String {
-    let commit = option_env!("SPECTROLL_COMMIT").map_or(String::new(), |commit| format!(" ({commit})"));
-    env!("CARGO_PKG_VERSION").to_owned() + &commit
-}
-
 /// The model of a name: a built-in one, or a file.
 fn model(name: &str) -> anyhow::Result<Model> {
     model_at(name, None)
@@ -149,18 +150,18 @@ fn model_at(name: &str, grid: Option<Grid>) -> anyhow::Result<Model> {
     })?;
     if let Some(grid) = grid.filter(|grid| *grid != model.grid()) {
         anyhow::bail!(Usage(format!(
-            "--wavelengths {grid} is for built-in models, and the grid of {name} is {}: make another with `spectroll fit \
-             --wavelengths {grid}`",
+            "--wavelengths {grid}: the grid belongs to the model {name:?}, and is {}: fit it with spectroll fit \
+             --wavelengths",
             model.grid()
         )));
     }
     Ok(model)
 }
 
-/// What a name that is no model's may have meant.
+/// Says what a name that is no model's may have meant.
 fn no_model(name: &str) -> String {
     let builtin = Model::BUILTIN.join(", ");
-    let meant = match (BuiltinTable::named(name), closest(name, Model::BUILTIN)) {
+    let meant = match (BuiltinTable::named(name), closest(name, Model::BUILTIN.iter().copied())) {
         (Some(BuiltinTable::Munsell | BuiltinTable::Vrhel), _) => Some("munsell-vrhel".to_owned()),
         (_, None) if closest(name, ["munsell", "vrhel"]).is_some() => Some("munsell-vrhel".to_owned()),
         (_, closest) => closest,
@@ -172,17 +173,6 @@ fn no_model(name: &str) -> String {
 
 fn has_extension(path: impl AsRef<Path>, extension: &str) -> bool {
     path.as_ref().extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
-}
-
-/// The same, where a built-in model may be asked for at other wavelengths than its own.
-fn model_at(name: &str, wavelengths: Option<Grid>) -> anyhow::Result<Model> {
-    match wavelengths {
-        Some(grid) if Model::BUILTIN.contains(&name) => Ok(Model::builtin_at(name, grid)?),
-        Some(grid) if Path::new(name).exists() => anyhow::bail!(Usage(format!(
-            "--wavelengths {grid}: the grid belongs to the model {name:?}: fit it with spectroll fit --wavelengths"
-        ))),
-        _ => model(name),
-    }
 }
 
 /// The folder that a path names something in.

@@ -20,7 +20,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::grid::{self, Extrapolation, Grid, GridError, Spline};
 pub use builtin::BuiltinTable;
-pub(crate) use builtin::daylights;
 
 /// Limit on the bytes read of a file, and on those that a compressed file may unpack to: 512 MiB, 67 million values.
 const MAX_BYTES: u64 = 512 << 20;
