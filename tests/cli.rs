@@ -134,7 +134,7 @@ fn a_model_is_fitted_and_drawn_from() {
         ("fit absent.mat -o x.json", 4, "cannot read \"absent.mat\""),
         ("fit m.json -o x.json", 4, "unknown type of file"),
         ("fit munsell -o m.json", 1, "exists already"),
-        ("sample lamps.csv -n 5 -o x.npy", 4, "is not a model file"),
+        ("sample lamps.csv -n 5 -o x.npy", 4, "lamps.csv is a file of data: fit a model to it first"),
     ] {
         fails(folder.path(), arguments, code, message);
     }

@@ -120,7 +120,7 @@ pub(super) fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
         Some((file, variable)) if !Path::new(name).exists() => (file, Some(variable)),
         _ => (name, None),
     };
-    if !Path::new(path).exists() {
+    if Path::new(path).extension().is_none() && !Path::new(path).exists() {
         return Err(Usage(no_data(name)).into());
     }
     Ok(Table::open_on(Path::new(path), variable, grid)?)

@@ -40,7 +40,7 @@ use exit::Usage;
 
 /// Draws random, physically valid natural spectra on the GPU.
 #[derive(Parser)]
-#[command(version = version(), after_help = EXAMPLES)]
+#[command(version = env!("SPECTROLL_VERSION"), after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -114,12 +114,6 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Completions(arguments) => packaging::completions(Arguments::command(), arguments),
         Command::Man(arguments) => packaging::man(Arguments::command(), arguments),
     }
-}
-
-/// The version, and the commit where the build knew it.
-fn version() -> String {
-    let commit = option_env!("SPECTROLL_COMMIT").map_or(String::new(), |commit| format!(" ({commit})"));
-    env!("CARGO_PKG_VERSION").to_owned() + &commit
 }
 
 /// The model of a name: a built-in one, or a file.
