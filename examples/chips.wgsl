@@ -25,6 +25,6 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let mirrored = cell.x >= COLUMNS / 2u;
     let column = select(cell.x, COLUMNS - 1u - cell.x, mirrored);
     let chip = chip_draw(vec2(2u, 0u), vec2(cell.y * COLUMNS + column, 0u));
-    let colour = select(chip_srgb(chip), vec3(chip_xyz(chip).y), mirrored);
+    let colour = select(chip_linear_srgb(chip), vec3(chip_xyz(chip).y), mirrored);
     return vec4(encoded(colour), 1f);
 }

@@ -116,7 +116,7 @@ fn what_does_not_fit_is_refused_with_the_limit() {
         .build()
         .expect("it can be drawn");
     let error = Sampler::new(&device, &many).unwrap_err();
-    assert_eq!(error, SamplerError::TooManyBuffers { buffers: 6, largest: 4 });
+    assert_eq!(error, SamplerError::TooManyBuffers { buffers: 7, largest: 4 });
 }
 
 /// A module as `naga_oil` imports it into another shader.

@@ -140,3 +140,11 @@ fn the_program_fits_built_in_models_at_the_wavelengths_asked_for() {
     let beyond = "sample munsell-vrhel -n 1 --wavelengths 380:5:780 -o d.npy";
     fails(folder, beyond, 2, "from 400 to 700 nm");
 }
+
+#[test]
+fn the_version_has_the_commit_where_it_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let (version, _) = succeeds(folder.path(), "--version");
+    assert!(version.starts_with(concat!("spectroll ", env!("CARGO_PKG_VERSION"))), "{version}");
+    assert_eq!(version.trim(), concat!("spectroll ", env!("SPECTROLL_VERSION")));
+}

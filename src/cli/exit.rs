@@ -93,9 +93,9 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             OutputError::Unfinished { .. } => " (--resume or --force)",
             OutputError::NoSpace { .. } => " (--force-space overrides)",
             OutputError::NotStreamed => " (--format csv or npy)",
-            OutputError::Cannot { holds: "one array" | "spectra", .. } => {
-                " (--quantities, or --arrays for scenes)"
-            }
+            OutputError::Cannot { remedy, .. } if remedy.contains("quantity") => " (--quantities)",
+            OutputError::Cannot { holds: "spectra", remedy: "choose spectra alone", .. } => " (--quantities)",
+            OutputError::Cannot { holds: "one array" | "spectra", .. } => " (--arrays)",
             OutputError::Cannot { holds: "f32 and f64", .. } => " (--dtype)",
             OutputError::NotBuilt { .. } => " (cargo build --features)",
             _ => "",

@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
     force: bool,
 }
 
-/// How large a model should be.
+/// Size of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Components {
     Count(usize),
@@ -120,7 +120,7 @@ pub(super) fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
         Some((file, variable)) if !Path::new(name).exists() => (file, Some(variable)),
         _ => (name, None),
     };
-    if !Path::new(path).exists() {
+    if Path::new(path).extension().is_none() && !Path::new(path).exists() {
         return Err(Usage(no_data(name)).into());
     }
     Ok(Table::open_on(Path::new(path), variable, grid)?)

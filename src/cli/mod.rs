@@ -30,7 +30,6 @@ mod verify;
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::LazyLock;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use spectroll::output::IfExists;
@@ -41,7 +40,7 @@ use exit::Usage;
 
 /// Draws random, physically valid natural spectra on the GPU.
 #[derive(Parser)]
-#[command(version = VERSION.as_str(), after_help = EXAMPLES)]
+#[command(version = env!("SPECTROLL_VERSION"), after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -49,12 +48,6 @@ struct Arguments {
     #[arg(long, global = true, value_name = "FILE.toml")]
     config: Option<String>,
 }
-
-/// The version, and the commit where the build knew it.
-static VERSION: LazyLock<String> = LazyLock::new(|| match option_env!("SPECTROLL_COMMIT") {
-    Some(commit) => format!("{} ({commit})", env!("CARGO_PKG_VERSION")),
-    None => env!("CARGO_PKG_VERSION").to_owned(),
-});
 
 const EXAMPLES: &str = "\
 Examples:
@@ -65,7 +58,7 @@ Examples:
   spectroll verify reflectances.zarr
   spectroll scene --example condition3 --scenes 0..10 -o scenes.npz --preview scenes.png
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
-  spectroll shader granada --quantities srgb --prefix sun > sun.wgsl
+  spectroll shader granada --quantities linear_srgb --prefix sun > sun.wgsl
   spectroll inspect munsell-vrhel -o munsell-vrhel.png
   spectroll report munsell-vrhel -o report --quick
 

@@ -27,7 +27,7 @@ struct Row {
     spectra: usize,
     /// The grid that it is on unless another is asked for.
     wavelengths: String,
-    /// Where its spectra were measured.
+    /// Range of the wavelengths of its spectra, nm.
     measured: String,
     components: usize,
     /// The share of the variance that the components explain on that grid.

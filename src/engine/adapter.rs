@@ -88,7 +88,7 @@ pub(super) fn find(wanted: &str) -> Result<wgpu::Adapter, EngineError> {
     }
 }
 
-/// Where in a list the adapter is that is wanted. Digits are an index and nothing else: names are full of version
+/// Position in a list of the adapter that is wanted. Digits are an index and nothing else: names are full of version
 /// numbers, so that "5" would find "LLVM 15.0.6".
 fn position(wanted: &str, all: &[Adapter]) -> Option<usize> {
     let wanted = wanted.trim().to_lowercase();

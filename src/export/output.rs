@@ -94,7 +94,7 @@ impl Output {
         Output { mode, ..self }
     }
 
-    /// Whether the data set must have room before it is begun ([`SpaceCheck::Require`]).
+    /// Check of the room for the data set before it is begun ([`SpaceCheck::Require`]).
     pub fn space_check(self, space_check: SpaceCheck) -> Self {
         Output { space_check, ..self }
     }

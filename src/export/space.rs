@@ -19,10 +19,10 @@ const BLOCK: u64 = 4096;
 /// Bytes of the wavelength on each line of a text file, with what sets it apart.
 const WAVELENGTH: u64 = 5;
 
-/// Whether an export needs to find enough space before it begins.
+/// Treatment of an export that may not fit on the disk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SpaceCheck {
-    /// What cannot fit is refused.
+    /// Refuse what cannot fit.
     #[default]
     Require,
     /// The export begins, and fails when the disk is full.

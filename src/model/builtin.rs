@@ -8,7 +8,7 @@ use crate::grid::{Extrapolation, Grid};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BuiltinData {
-    /// What the spectra are.
+    /// Kind of the spectra.
     pub kind: SpectrumKind,
     /// The number of spectra.
     pub spectra: usize,

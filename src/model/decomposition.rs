@@ -225,7 +225,7 @@ mod tests {
         check(100_000, 2);
     }
 
-    /// What the check is for: a result that is nearly right, each way in which one can be wrong.
+    /// A result that is nearly right, each way in which one can be wrong.
     #[test]
     fn a_wrong_decomposition_is_noticed() {
         let mut rng = Stream::new(3).rng();

@@ -171,7 +171,7 @@ impl FileFormat {
                 cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
             }
             FileFormat::Npy if !one && of_scenes => {
-                let remedy = "choose one, or name it .npz, .zarr, .h5 or .parquet";
+                let remedy = "choose one array, or name it .npz, .zarr, .h5 or .parquet";
                 cannot(".npy", "one array", remedy)
             }
             FileFormat::Npy if !one => {

@@ -141,7 +141,7 @@ fn write_values<T: DataType, const SIZE: usize>(
 /// Schema in Parquet's terms.
 fn root(fields: &[Field]) -> TypePtr {
     let fields = fields.iter().map(|field| {
-        let name = if field.is_list() { "dtype" } else { &field.name };
+        let name = if field.is_list() { "element" } else { &field.name };
         let (physical, logical) = match field.stored {
             Dtype::F32 => (Physical::FLOAT, None),
             Dtype::F64 => (Physical::DOUBLE, None),
@@ -219,7 +219,7 @@ fn arrow_field(to: &mut FlatBufferBuilder, field: &Field) -> Table {
     if !field.is_list() {
         return arrow_value(to, &field.name, field.stored);
     }
-    let value = arrow_value(to, "dtype", field.stored);
+    let value = arrow_value(to, "element", field.stored);
     let list = to.start_table();
     to.push_slot_always(entry(0), field.width as i32);
     let list = to.end_table(list);

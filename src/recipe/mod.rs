@@ -270,12 +270,12 @@ mod tests {
         let surface = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap());
         let light = Recipe::builder(&Model::builtin("granada").unwrap());
         for (recipe, part) in [
-            (surface.clone().lrv(f64::NAN), "NaN: it must be above 0 and below 1"),
+            (surface.clone().lrv(f64::NAN), "NaN: it is a fraction above 0 and below 1"),
             (surface.clone().lrv(0.0), "reflectance of 0:"),
             (surface.clone().lrv(0.996), "the largest is 0.995928"),
             (surface.clone().lrv(0.6..0.2), "between 0.6 and 0.2: the first must be below the second"),
             (surface.clone().lrv(0.4..0.4), "between 0.4 and 0.4: the first must be below the second"),
-            (surface.clone().lrv(0.4..f64::NAN), "NaN: it must be above 0 and below 1"),
+            (surface.clone().lrv(0.4..f64::NAN), "NaN: it is a fraction above 0 and below 1"),
             (surface.clone().lrv(0.0..0.4), "reflectance of 0:"),
             (surface.clone().lrv(0.2..1.5), "reflectance of 1.5:"),
             (surface.clone().lrv(0.2..0.996), "the largest is 0.995928"),

@@ -48,7 +48,7 @@ pub(in crate::cli) struct OutputArguments {
     force_space: bool,
 }
 
-/// What the options are resolved for.
+/// Purpose of the options.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::cli) enum Purpose {
     /// To make the data set, for which a shard has to be known.

@@ -34,7 +34,7 @@ pub(in crate::cli) struct DryRun<'a> {
     engine: String,
     /// In a short trial, of the drawing alone.
     draws_per_second: f64,
-    /// How many of them this run would draw.
+    /// Number of them that this run would draw.
     #[serde(skip)]
     own_draws: u64,
     #[serde(skip)]

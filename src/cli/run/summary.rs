@@ -7,7 +7,7 @@ use super::folder_of;
 use crate::cli::folder;
 use crate::cli::parse::{counted, grouped};
 
-/// What was made, before the number of rows, where the name does not say it.
+/// Names what was made, before the number of rows, where the name does not say it.
 pub(in crate::cli) fn kind(output: &Output, files: Option<u64>) -> String {
     match (files, output.destination()) {
         (Some(files), _) => format!("{}, ", folder_of(files)),
@@ -16,7 +16,7 @@ pub(in crate::cli) fn kind(output: &Output, files: Option<u64>) -> String {
     }
 }
 
-/// How many of the spectra reach 1, and how to have none; nothing where none does.
+/// Says how many of the spectra reach 1, and how to have none; nothing where none does.
 pub(in crate::cli) fn above_one(above_one: u64, draws: u64, setting: &str) -> Option<String> {
     let share = 100.0 * above_one as f64 / draws as f64;
     let verb = if above_one == 1 { "reaches" } else { "reach" };
@@ -38,7 +38,7 @@ pub(in crate::cli) fn part(output: &Output, schema: &Schema) -> Option<String> {
     Some(format!("part {} of {}, {chunks}", shard.index, shard.count))
 }
 
-/// What a run of one of several processes leaves, where there are several.
+/// Says what a run of one of several processes leaves, where there are several.
 pub(in crate::cli) fn status(output: &Output, status: SetStatus) -> Option<String> {
     match status {
         SetStatus::Sealed => (output.part() != Shard::WHOLE).then(|| "the set is complete".to_owned()),
@@ -50,7 +50,7 @@ pub(in crate::cli) fn status(output: &Output, status: SetStatus) -> Option<Strin
     }
 }
 
-/// Whether the disk has room; nothing of standard output.
+/// Says whether the disk has room; nothing of standard output.
 pub(in crate::cli) fn room(output: &Output, space: Space) -> Option<String> {
     if matches!(output.destination(), Destination::Stdout(_)) {
         return None;
