@@ -244,7 +244,12 @@ fn what_is_in_the_way_of_a_file_stays() {
     fails(folder.path(), "sample granada -n 5 -o no/such/x.npy", 1, "create it first");
     fails(folder.path(), "sample granada -n 5 -o x.xlsx", 2, "name it .npy, .npz, .csv");
     let several = "sample granada -n 5 --quantities spectra,xyz -o x.npy";
-    fails(folder.path(), several, 2, "choose one quantity, or name it .npz, .zarr, .h5 or .parquet (--quantities)");
+    fails(
+        folder.path(),
+        several,
+        2,
+        "choose one quantity, or name it .npz, .zarr, .h5 or .parquet (--quantities)",
+    );
     for format in ["parquet", "zarr", "spd", "h5"] {
         let run = format!("sample granada -n 5 --format {format} -o -");
         fails(folder.path(), &run, 2, "standard output takes CSV and .npy alone");
@@ -380,7 +385,11 @@ fn scenes_are_drawn_planned_and_pictured() {
         ("--example condition9 -o x.npz", 2, "condition1, condition2, condition3"),
         ("mine.toml --preview a.png", 1, "exists already"),
         ("mine.toml -o x.npy", 2, "choose one array, or name it .npz, .zarr, .h5 or .parquet (--arrays)"),
-        ("mine.toml --dry-run -o x.npy", 2, "choose one array, or name it .npz, .zarr, .h5 or .parquet (--arrays)"),
+        (
+            "mine.toml --dry-run -o x.npy",
+            2,
+            "choose one array, or name it .npz, .zarr, .h5 or .parquet (--arrays)",
+        ),
         ("mine.toml --arrays target_lrv --format spd -o x/", 2, "choose the spectra of one group or more"),
         (
             "mine.toml --arrays light -o x.npy",

@@ -185,7 +185,12 @@ fn types() {
         assert_eq!(python(folder, &code), "[True, True, True, True, True]", "{dtype}");
     }
     for output in ["x.mat", "x.parquet"] {
-        fails(folder, &format!("sample granada -n 5 --dtype f16 -o {output}"), 2, "choose one of them (--dtype)");
+        fails(
+            folder,
+            &format!("sample granada -n 5 --dtype f16 -o {output}"),
+            2,
+            "choose one of them (--dtype)",
+        );
         succeeds(folder, &format!("sample granada -n 5 --dtype f64 -o {output}"));
     }
 }

@@ -162,7 +162,7 @@ fn values_and_places_of_bad_data() {
     assert!(message(&with(f64::INFINITY), None).contains("410 nm is inf"));
 
     let lone = [order.header(), order.doubles("sur_x", 3, &SPECTRA)].concat();
-    assert!(message(&lone, None).contains("no matrix of spectra with its sampling"));
+    assert!(message(&lone, None).contains("no matrix of spectra with its wavelengths"));
     let other_length =
         [order.header(), order.doubles("sur_x", 3, &SPECTRA), order.sampling("S_x", [400., 10., 4.])];
     assert!(message(&other_length.concat(), None).contains("sur_x (3 x 2)"));

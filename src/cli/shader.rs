@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use spectroll::Grid;
 use spectroll::output::write_file;
 
-use super::{if_exists, model_at};
 use super::options::RecipeArguments;
+use super::{if_exists, model_at};
 
 /// Print WGSL functions that draw spectra, for a shader of your own
 ///
