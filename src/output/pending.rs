@@ -234,7 +234,12 @@ pub(super) fn sync_folder(folder: &Path) {
 /// Free bytes where a path names something, for whoever runs this; `None` where that cannot be told.
 pub(crate) fn available_space(path: &Path) -> Option<u64> {
     #[cfg(any(unix, windows))]
-    return fs4::available_space(folder(path)).ok();
+    {
+        // A file system of no size at all, such as /proc, has other reasons to refuse a file.
+        let folder = folder(path);
+        let has_size = fs4::total_space(folder).is_ok_and(|size| size > 0);
+        return fs4::available_space(folder).ok().filter(|_| has_size);
+    }
     #[cfg(not(any(unix, windows)))]
     return None;
 }
