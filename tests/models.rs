@@ -137,6 +137,20 @@ fn a_fit_takes_a_share_of_the_variance_and_a_scale() {
 }
 
 #[test]
+fn a_model_is_told_to_programs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (json, _) = succeeds(folder.path(), "inspect munsell-vrhel --wavelengths 420:20:680 --json");
+    let facts: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((facts["kind"].as_str(), facts["wavelengths_nm"][1].as_f64()), (Some("reflectance"), Some(440.0)));
+    let accepted = facts["accepted_percent"].as_f64().unwrap();
+    assert!((70.0..90.0).contains(&accepted), "{accepted}");
+    let components = facts["components"].as_array().unwrap();
+    assert_eq!((components.len(), components[0]["basis"].as_array().unwrap().len()), (6, 14));
+    let (table, _) = succeeds(folder.path(), "inspect granada");
+    assert!(table.contains("of the model's candidates") && table.contains("power above 0"), "{table}");
+}
+
+#[test]
 fn the_grid_of_a_model_file_stands() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), "fit munsell vrhel -o m.json");
