@@ -142,9 +142,53 @@ fn the_program_fits_built_in_models_at_the_wavelengths_asked_for() {
 }
 
 #[test]
+fn a_model_is_told_to_programs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (json, _) = succeeds(folder.path(), "inspect munsell-vrhel --wavelengths 420:20:680 --json");
+    let facts: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((facts["kind"].as_str(), facts["wavelengths_nm"][1].as_f64()), (Some("reflectance"), Some(440.0)));
+    let accepted = facts["accepted_percent"].as_f64().unwrap();
+    assert!((70.0..90.0).contains(&accepted), "{accepted}");
+    let components = facts["components"].as_array().unwrap();
+    assert_eq!((components.len(), components[0]["basis"].as_array().unwrap().len()), (6, 14));
+    let (table, _) = succeeds(folder.path(), "inspect granada");
+    assert!(table.contains("of the model's candidates") && table.contains("power above 0"), "{table}");
+}
+
+#[test]
+fn the_grid_of_a_model_file_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(folder.path(), "fit munsell vrhel -o m.json");
+    let arguments = "sample m.json --wavelengths 400:5:700 -n 5 -o x.npy";
+    fails(folder.path(), arguments, 2, "make another with `spectroll fit --wavelengths 400:5:700`");
+}
+
+#[test]
 fn the_version_has_the_commit_where_it_is_known() {
     let folder = tempfile::tempdir().unwrap();
     let (version, _) = succeeds(folder.path(), "--version");
     assert!(version.starts_with(concat!("spectroll ", env!("CARGO_PKG_VERSION"))), "{version}");
     assert_eq!(version.trim(), concat!("spectroll ", env!("SPECTROLL_VERSION")));
+}
+
+#[test]
+fn a_fit_takes_a_share_of_the_variance_and_a_scale() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, said) = succeeds(folder.path(), "fit munsell vrhel -k 99% -o share.json");
+    let model = |file: &str| Model::load(&folder.path().join(file)).unwrap();
+    let k = model("share.json").components();
+    assert!(said.contains(&format!("{k} components explain")), "{said}");
+    let explained = |k: usize| {
+        succeeds(folder.path(), &format!("fit munsell vrhel -k {k} -o k{k}.json"));
+        model(&format!("k{k}.json")).parts().explained_variance.iter().sum::<f64>()
+    };
+    assert!(explained(k) >= 0.99 && explained(k - 1) < 0.99);
+
+    let percent = "400,40,50,60\n410,41,55,52\n420,42,51,70\n";
+    std::fs::write(folder.path().join("percent.csv"), percent).unwrap();
+    succeeds(
+        folder.path(),
+        "fit percent.csv --kind reflectance -k 1 --scale 0.01 --wavelengths 400:10:420 -o percent.json",
+    );
+    assert!((model("percent.json").parts().mean[0] - 0.5).abs() < 1e-12);
 }

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
+use serde::Serialize;
 use spectroll::{Bounds, CoverSize, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind};
 
 use super::options::RecipeArguments;
@@ -39,6 +40,10 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
 
+    /// Print all of it as JSON
+    #[arg(long)]
+    json: bool,
+
     /// Replace the picture where it exists
     #[arg(long)]
     pub(crate) force: bool,
@@ -59,9 +64,67 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         };
         picture::write(&figure.drawing(), path, format, if_exists(arguments.force))?;
     }
-    let table = table(&arguments.model, &model, &recipe);
-    std::io::stdout().lock().write_all(table.as_bytes())?;
+    let text = match arguments.json {
+        true => serde_json::to_string_pretty(&Facts::of(&arguments.model, &model, &recipe))? + "\n",
+        false => table(&arguments.model, &model, &recipe),
+    };
+    std::io::stdout().lock().write_all(text.as_bytes())?;
     Ok(())
+}
+
+/// The table for programs.
+#[derive(Serialize)]
+struct Facts<'a> {
+    model: &'a str,
+    kind: SpectrumKind,
+    wavelengths_nm: Vec<f64>,
+    normalization: Normalization,
+    sources: &'a [String],
+    /// The largest luminous reflectance that scaled reflectances reach; nothing of illuminants.
+    largest_lrv: Option<f64>,
+    /// The estimated share of the model's Gaussian that is accepted.
+    accepted_percent: Option<f64>,
+    candidates_per_draw: Option<f64>,
+    /// Why the recipe cannot be drawn, where it cannot.
+    refused: Option<String>,
+    mean: &'a [f64],
+    components: Vec<Component>,
+}
+
+#[derive(Serialize)]
+struct Component {
+    explained_variance_percent: f64,
+    weight_mean: f64,
+    weight_sd: f64,
+    peak_nm: f64,
+    basis: Vec<f64>,
+}
+
+impl<'a> Facts<'a> {
+    fn of(name: &'a str, model: &'a Model, recipe: &Result<Recipe, RecipeError>) -> Facts<'a> {
+        let parts = model.parts();
+        let component = |index: usize| Component {
+            explained_variance_percent: 100.0 * parts.explained_variance[index],
+            weight_mean: parts.weight_mean[index],
+            weight_sd: parts.weight_covariance[(index, index)].max(0.0).sqrt(),
+            peak_nm: peak(model, index),
+            basis: parts.basis.row(index).iter().copied().collect(),
+        };
+        let drawn = recipe.as_ref().ok();
+        Facts {
+            model: name,
+            kind: model.kind(),
+            wavelengths_nm: model.grid().wavelengths().collect(),
+            normalization: parts.normalization,
+            sources: &parts.sources,
+            largest_lrv: Recipe::largest_lrv(model),
+            accepted_percent: drawn.map(|recipe| 100.0 * recipe.probability()),
+            candidates_per_draw: drawn.map(|recipe| 1.0 / recipe.acceptance()),
+            refused: recipe.as_ref().err().map(RecipeError::to_string),
+            mean: parts.mean.as_slice(),
+            components: (0..model.components()).map(component).collect(),
+        }
+    }
 }
 
 /// Everything that is printed.
