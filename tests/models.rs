@@ -146,7 +146,10 @@ fn a_model_is_told_to_programs() {
     let folder = tempfile::tempdir().unwrap();
     let (json, _) = succeeds(folder.path(), "inspect munsell-vrhel --wavelengths 420:20:680 --json");
     let facts: serde_json::Value = serde_json::from_str(&json).unwrap();
-    assert_eq!((facts["kind"].as_str(), facts["wavelengths_nm"][1].as_f64()), (Some("reflectance"), Some(440.0)));
+    assert_eq!(
+        (facts["kind"].as_str(), facts["wavelengths_nm"][1].as_f64()),
+        (Some("reflectance"), Some(440.0))
+    );
     let accepted = facts["accepted_percent"].as_f64().unwrap();
     assert!((70.0..90.0).contains(&accepted), "{accepted}");
     let components = facts["components"].as_array().unwrap();
