@@ -238,10 +238,10 @@ pub(crate) fn available_space(path: &Path) -> Option<u64> {
         // A file system of no size at all, such as /proc, has other reasons to refuse a file.
         let folder = folder(path);
         let has_size = fs4::total_space(folder).is_ok_and(|size| size > 0);
-        return fs4::available_space(folder).ok().filter(|_| has_size);
+        fs4::available_space(folder).ok().filter(|_| has_size)
     }
     #[cfg(not(any(unix, windows)))]
-    return None;
+    None
 }
 
 /// Folder of the file that a path names.

@@ -113,7 +113,7 @@ fn one_in(draws: f64) -> String {
 /// Says what is wrong with a target luminous reflectance: most that is above 1 was meant in percent.
 fn not_an_lrv(lrv: f64) -> String {
     match lrv {
-        2.0..=100.0 => format!(
+        2.0..100.0 => format!(
             "it is a fraction between 0 and 1 (a perfect white); did you mean {}?",
             rounded(lrv / 100.0)
         ),

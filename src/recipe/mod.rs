@@ -285,7 +285,7 @@ mod tests {
             ),
             (
                 surface.clone().lrv(0.2..0.95).bounds(Bounds::Both).max_attempts(100),
-                "attempts, or lower that end",
+                "attempts or more, or lower that end",
             ),
             (
                 surface.clone().lrv(0.2..0.6).bounds(Bounds::Both).proposal(ProposalKind::Cover),
@@ -296,17 +296,17 @@ mod tests {
             (surface.clone().max_attempts(0), "at least 1 attempt"),
             (surface.clone().max_attempts(u32::MAX), "at most 2147483647"),
             (surface.clone().covariance_scale(1e6).proposal(ProposalKind::Plain), "none of 65536 was"),
-            (surface.clone().covariance_scale(100.0).max_attempts(50), "allow at least"),
+            (surface.clone().covariance_scale(100.0).max_attempts(50), "attempts or more"),
             (light.clone().lrv(0.5), "of illuminants"),
             (light.clone().xyz([0.3; 3]), "of illuminants"),
             (surface.clone().xyz([0.3, 1.0, 0.3]), "Y above 0 and below 1"),
             (surface.clone().xyz([0.3, f64::NAN, 0.3]), "must be finite"),
             (surface.clone().xyz([0.3; 3]).lrv(0.3), "leave the target for it out"),
             (surface.clone().xyz([0.3; 3]).covariance_scale(0.0), "fit it with more components"),
-            (surface.clone().bounds(Bounds::Both), "without a target luminous reflectance"),
+            (surface.clone().bounds(Bounds::Both), "needs a target luminous reflectance"),
             (
                 surface.clone().illuminant(Illuminant::E),
-                "without XYZ, chromaticity or linear sRGB of reflectances",
+                "needs the quantity xyz, chromaticity or linear_srgb of reflectances",
             ),
             (surface.clone().xyz_scale(XyzScale::UnitY).quantities([Quantity::Xyz]), "of illuminants"),
         ] {
@@ -315,8 +315,7 @@ mod tests {
         }
         // What the message advises is enough.
         let advised = message(surface.clone().covariance_scale(100.0).max_attempts(50));
-        let attempts =
-            advised.split("allow at least ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        let attempts = advised.split("; allow ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!(surface.covariance_scale(100.0).max_attempts(attempts).build().is_ok());
     }
 
