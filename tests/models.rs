@@ -163,7 +163,7 @@ fn the_grid_of_a_model_file_stands() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), "fit munsell vrhel -o m.json");
     let arguments = "sample m.json --wavelengths 400:5:700 -n 5 -o x.npy";
-    fails(folder.path(), arguments, 2, "make another with `spectroll fit --wavelengths 400:5:700`");
+    fails(folder.path(), arguments, 2, "the grid belongs to the model");
 }
 
 #[test]

@@ -311,7 +311,10 @@ fn colours_are_those_of_the_spectra() {
                 let width = expected.len();
                 // Chromaticities of lights that are fixed are there once, whatever their intensities.
                 let given = values[number].len() / width;
-                assert!(given == count || (number == 1 && count % given == 0), "{group}: {given} of {count}");
+                assert!(
+                    given == count || (number == 1 && count.is_multiple_of(given)),
+                    "{group}: {given} of {count}"
+                );
                 let scale = if number == 1 { 1.0 } else { white };
                 for (a, b) in values[number][i % given * width..][..width].iter().zip(expected) {
                     worst[number] = worst[number].max((f64::from(*a) - b).abs() / scale);

@@ -85,7 +85,7 @@ struct Facts<'a> {
     /// The estimated share of the model's Gaussian that is accepted.
     accepted_percent: Option<f64>,
     candidates_per_draw: Option<f64>,
-    /// Why the recipe cannot be drawn, where it cannot.
+    /// Reason for which the recipe cannot be drawn, where it cannot.
     refused: Option<String>,
     mean: &'a [f64],
     components: Vec<Component>,
