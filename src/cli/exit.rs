@@ -33,10 +33,7 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
     ) {
         2 // nothing that was read is wrong: the grid was asked for
     } else if error.is::<DatasetError>() || error.is::<FitError>() || error.is::<ModelError>() {
-        match error.downcast_ref() {
-            Some(ModelError::BuiltinRange { .. }) => 2,
-            _ => 4,
-        }
+        4
     } else if error.is::<Unverified>() {
         5
     } else if error.is::<RecipeError>()
