@@ -16,9 +16,9 @@ struct Sizes {
 @group(0) @binding(3) var<storage, read_write> spectra: array<f32>;
 
 /// One thread for each value.
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = id.y * groups.x * 64u + id.x;
+    let i = id.y * groups.x * WORKGROUPu + id.x;
     if i >= sizes.values {
         return;
     }

@@ -1,16 +1,15 @@
 //! Draws of what plain rejection cannot reach: near-white reflectances and strong covariances, from a cover.
 
+mod engines;
+
+use engines::{cpu, gpu, gpu_is_software, surfaces};
 use spectroll::{
-    Bounds, DrawRange, DrawStatus, Engine, EngineChoice, EngineError, Model, ProposalKind, Quantity, Recipe,
-    RecipeBuilder, RecipeError, Stream, colorimetry,
+    Bounds, DrawRange, DrawStatus, Engine, EngineError, ProposalKind, Quantity, Recipe, RecipeBuilder,
+    RecipeError, Stream, colorimetry,
 };
 
 /// Draws of each recipe.
 const COUNT: u64 = 20_003;
-
-fn surfaces() -> RecipeBuilder {
-    Recipe::builder(&Model::builtin("munsell-vrhel").expect("it is built in"))
-}
 
 fn near_white(lrv: f64) -> RecipeBuilder {
     surfaces().lrv(lrv).bounds(Bounds::Scaled)
@@ -44,10 +43,7 @@ fn extremes() -> Vec<(String, Recipe, f64)> {
 
 #[test]
 fn extremes_are_covered_and_physical_and_the_same_on_every_engine() {
-    let (cpu, gpu) =
-        (Engine::new(&EngineChoice::Cpu).expect("it is always there"), Engine::new(&EngineChoice::Gpu));
-    let gpu = gpu.unwrap_or_else(|e| panic!("this needs an adapter: {e}"));
-    let software = gpu.adapter().is_some_and(|adapter| adapter.kind == "software");
+    let software = gpu_is_software();
     let weights = colorimetry::lrv_weights("400:10:700".parse().expect("a grid")).expect("it is visible");
     for (name, recipe, probability) in extremes() {
         assert_eq!(recipe.proposal(), ProposalKind::Cover, "{name}");
@@ -56,7 +52,7 @@ fn extremes_are_covered_and_physical_and_the_same_on_every_engine() {
         assert!(recipe.acceptance() > 0.1 && error < 0.06, "{name}: {} {error}", recipe.acceptance());
         assert!(recipe.cover().is_some_and(|cover| cover.bytes <= 256 << 10));
         let draws = Stream::named(40, &name).draws((1 << 32) - 77..(1 << 32) - 77 + COUNT);
-        let (ours, theirs) = (rows(&cpu, &recipe, draws), rows(&gpu, &recipe, draws));
+        let (ours, theirs) = (rows(cpu(), &recipe, draws), rows(gpu(), &recipe, draws));
         assert!(!software || ours == theirs, "{name}");
         let mut attempts = 0;
         for (i, (spectrum, status)) in ours.0.chunks_exact(31).zip(&ours.1).enumerate() {
@@ -104,8 +100,7 @@ fn a_cover_draws_what_plain_rejection_draws() {
     let draws = |proposal, seed| {
         let recipe = surfaces().covariance_scale(25.0).proposal(proposal).build().expect("it can be drawn");
         assert_eq!(recipe.proposal(), proposal);
-        let engine = Engine::new(&EngineChoice::Cpu).expect("it is always there");
-        engine.collect(&recipe, Stream::new(seed).draws(0..COUNT)).expect("it draws")
+        cpu().collect(&recipe, Stream::new(seed).draws(0..COUNT)).expect("it draws")
     };
     let samples = [draws(ProposalKind::Plain, 42), draws(ProposalKind::Cover, 43)];
     for band in 0..31 {

@@ -1,8 +1,9 @@
 //! The first sentence of every doc comment in `src/` stands alone, since lists of items show it without its item:
 //! a noun phrase or a verb in the third person, not a clause such as "What it holds" or "The same for rows".
 
-use std::fs;
-use std::path::{Path, PathBuf};
+mod sources;
+
+use sources::sources;
 
 /// Openings that leave a sentence incomplete without the name of its item.
 const OPENINGS: [&str; 11] =
@@ -118,28 +119,14 @@ fn complaint(doc: &Doc) -> Option<String> {
         .then(|| format!("is no sentence before its first empty line: {sentence}"))
 }
 
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).expect("the sources are there") {
-        let path = entry.expect("the folder can be read").path();
-        match path.is_dir() {
-            true => sources(&path, found),
-            false if path.extension().is_some_and(|e| e == "rs") => found.push(path),
-            false => {}
-        }
-    }
-}
-
 #[test]
 fn first_sentences_stand_alone() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut files = Vec::new();
-    sources(&root.join("src"), &mut files);
-    files.sort();
+    let files = sources();
     let (mut count, mut wrong) = (0, Vec::new());
-    for file in &files {
-        let docs = docs(&fs::read_to_string(file).expect("sources are text"));
+    for (name, text) in &files {
+        let docs = docs(text);
         count += docs.len();
-        let name = file.strip_prefix(root).expect("it is below the root").display();
+        let name = name.display();
         wrong.extend(docs.iter().filter_map(|doc| Some(format!("{name}:{}: {}", doc.line, complaint(doc)?))));
     }
     assert!(count > files.len(), "{count} doc comments in {} files: are they still found?", files.len());

@@ -1,10 +1,13 @@
 //! Draws that each have a target luminous reflectance of their own: how their labels are distributed, and what they
 //! do not depend on. That engines agree on them is for `twins.rs` and `quantities.rs`.
 
+mod engines;
+
+use engines::{cpu, surfaces};
 use rand::distr::Distribution;
 use spectroll::{
-    Bounds, Draw, Dtype, Engine, EngineChoice, EngineError, Layout, Lrv, Model, ProposalKind, Quantity,
-    Recipe, RecipeBuilder, Stream, colorimetry,
+    Bounds, Draw, Dtype, EngineError, Layout, Lrv, ProposalKind, Quantity, Recipe, RecipeBuilder, Stream,
+    colorimetry,
 };
 
 const LOW: f64 = 0.2;
@@ -16,10 +19,6 @@ const COUNT: u64 = 40_000;
 /// The distance from the distribution that it should have which an empirical one of [`COUNT`] values exceeds once in
 /// 10^9 (Kolmogorov and Smirnov).
 const DISTANCE: f64 = 0.01636;
-
-fn surfaces() -> RecipeBuilder {
-    Recipe::builder(&Model::builtin("munsell-vrhel").expect("it is built in"))
-}
 
 fn recipe(bounds: Bounds) -> Recipe {
     let wanted = [Quantity::Spectra, Quantity::Weights, Quantity::Lrv];
@@ -169,11 +168,10 @@ fn the_acceptance_is_that_of_draws() {
 /// Labels stay in f32 beside spectra in f16, and are the same whatever else comes out.
 #[test]
 fn labels_do_not_depend_on_their_company() {
-    let engine = Engine::new(&EngineChoice::Cpu).expect("it is always there");
     let labels = |builder: RecipeBuilder| {
         let recipe = builder.lrv(LOW..HIGH).bounds(Bounds::Both).build().expect("it can be drawn");
         let mut labels = Vec::new();
-        let drawn = engine.draw(&recipe, Stream::new(56).draws(0..1003), |batch| {
+        let drawn = cpu().draw(&recipe, Stream::new(56).draws(0..1003), |batch| {
             labels.extend_from_slice(batch.values(Quantity::Lrv));
             Ok::<_, EngineError>(())
         });

@@ -1,11 +1,12 @@
 //! What comes out of a draw, quantity by quantity and layout by layout: the same bytes from every engine, and the
 //! values that f64 gives for the same random words.
 
-use std::sync::OnceLock;
+mod engines;
 
+use engines::{cpu, gpu, gpu_is_software, lights, surfaces};
 use spectroll::{
-    ArrayFormat, Bounds, DrawRange, Dtype, Engine, EngineChoice, EngineError, Illuminant, Intensity, Layout,
-    Lrv, Model, ProposalKind, Quantity, Recipe, RecipeBuilder, Stream, XyzScale, colorimetry,
+    ArrayFormat, Bounds, DrawRange, Dtype, Engine, EngineError, Illuminant, Intensity, Layout, Lrv,
+    ProposalKind, Quantity, Recipe, RecipeBuilder, Stream, XyzScale, colorimetry,
 };
 
 /// Draws of each recipe: not a multiple of 4, so that planes have padding and pairs a half.
@@ -15,25 +16,6 @@ const COUNT: u64 = 20_003;
 /// for weights). What sets it are the darkest draws, and the components of saturated colours, which are small
 /// differences.
 const BOUND: f64 = 2e-5;
-
-fn gpu() -> &'static Engine {
-    static GPU: OnceLock<Engine> = OnceLock::new();
-    GPU.get_or_init(|| {
-        Engine::new(&EngineChoice::Gpu).unwrap_or_else(|e| panic!("this needs an adapter: {e}"))
-    })
-}
-
-fn cpu() -> Engine {
-    Engine::new(&EngineChoice::Cpu).expect("the CPU is always there")
-}
-
-fn surfaces() -> RecipeBuilder {
-    Recipe::builder(&Model::builtin("munsell-vrhel").expect("it is built in"))
-}
-
-fn lights() -> RecipeBuilder {
-    Recipe::builder(&Model::builtin("granada").expect("it is built in"))
-}
 
 fn all_but(quantity: Quantity) -> impl Iterator<Item = Quantity> {
     Quantity::ALL.iter().copied().filter(move |q| *q != quantity)
@@ -93,7 +75,7 @@ fn values(engine: &Engine, recipe: &Recipe, draws: DrawRange) -> Vec<(ArrayForma
 
 #[test]
 fn every_layout_has_the_same_values_on_every_engine() {
-    let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
+    let software = gpu_is_software();
     let layouts = [Layout::Rows, Layout::PaddedRows, Layout::Planes];
     for (i, layout) in layouts.into_iter().enumerate() {
         for half in [false, true] {
@@ -115,7 +97,7 @@ fn every_layout_has_the_same_values_on_every_engine() {
             ];
             for recipe in recipes {
                 let draws = Stream::new(30).draws(5..5 + COUNT);
-                let ours = values(&cpu(), &recipe, draws);
+                let ours = values(cpu(), &recipe, draws);
                 if software {
                     assert!(ours == values(gpu(), &recipe, draws), "{layout:?}, half: {half}");
                 }
@@ -128,10 +110,10 @@ fn every_layout_has_the_same_values_on_every_engine() {
 
 #[test]
 fn every_recipe_has_the_same_values_on_every_engine() {
-    let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
+    let software = gpu_is_software();
     for (name, recipe) in recipes() {
         let draws = Stream::named(31, name).draws(0..COUNT);
-        let (ours, theirs) = (values(&cpu(), &recipe, draws), values(gpu(), &recipe, draws));
+        let (ours, theirs) = (values(cpu(), &recipe, draws), values(gpu(), &recipe, draws));
         assert!(!software || ours == theirs, "{name}");
     }
 }
@@ -141,9 +123,9 @@ fn every_recipe_has_the_same_values_on_every_engine() {
 fn quantities_do_not_depend_on_their_company() {
     let all = surfaces().quantities(all_but(Quantity::Intensity)).lrv(0.4).build().expect("it can be drawn");
     let draws = Stream::new(32).draws(0..1000);
-    for (format, words) in values(&cpu(), &all, draws) {
+    for (format, words) in values(cpu(), &all, draws) {
         let alone = surfaces().quantities([format.quantity]).lrv(0.4).build().expect("it can be drawn");
-        for engine in [&cpu(), gpu()] {
+        for engine in [cpu(), gpu()] {
             let found = values(engine, &alone, draws);
             let found = found.iter().find(|(f, _)| f.quantity == format.quantity);
             assert!(found == Some(&(format, words.clone())), "{} on {engine}", format.quantity);
@@ -158,7 +140,7 @@ fn what_is_filled_is_what_is_drawn() {
     for layout in [Layout::Rows, Layout::PaddedRows] {
         let recipe = surfaces().quantities(all_but(Quantity::Intensity)).layout(layout).build();
         let recipe = recipe.expect("it can be drawn");
-        for engine in [&cpu(), gpu()] {
+        for engine in [cpu(), gpu()] {
             let mut windows = Vec::new();
             let summary = engine.draw(&recipe, draws, |batch| {
                 windows.extend_from_slice(batch.spectra());
@@ -185,7 +167,7 @@ fn programs_in_loops_have_the_same_values_on_every_engine() {
         .expect("the table covers it");
     let model =
         Fit::new(SpectrumKind::Reflectance).components(7).fit(&data).expect("the data have that rank");
-    let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
+    let software = gpu_is_software();
     for layout in [Layout::Rows, Layout::PaddedRows, Layout::Planes] {
         for (half, lrv) in [false, true].into_iter().flat_map(|half| LRVS.map(|lrv| (half, lrv))) {
             let builder =
@@ -193,7 +175,7 @@ fn programs_in_loops_have_the_same_values_on_every_engine() {
             let builder = if half { builder.spectra_dtype(Dtype::F16) } else { builder };
             let recipe = builder.build().expect("it can be drawn");
             let draws = Stream::new(33).draws(0..1003);
-            let (ours, theirs) = (values(&cpu(), &recipe, draws), values(gpu(), &recipe, draws));
+            let (ours, theirs) = (values(cpu(), &recipe, draws), values(gpu(), &recipe, draws));
             assert!(!software || ours == theirs, "{layout:?}, half: {half}, {lrv:?}");
         }
     }

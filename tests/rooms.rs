@@ -1,8 +1,12 @@
 //! The rooms of `src/` in the order in which the data pass through them: a room imports only from those before it.
 //! Tests inside the rooms may look at everything.
 
+mod sources;
+
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use sources::sources;
 
 /// Every room, in order. `lib.rs` and `main.rs`, which see them all, are none.
 const ROOMS: [&str; 21] = [
@@ -28,17 +32,6 @@ const ROOMS: [&str; 21] = [
     "evaluation",
     "cli",
 ];
-
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).expect("the sources are there") {
-        let path = entry.expect("the folder can be read").path();
-        match path.is_dir() {
-            true => sources(&path, found),
-            false if path.extension().is_some_and(|e| e == "rs") => found.push(path),
-            false => {}
-        }
-    }
-}
 
 /// The code of a file without its tests and its comments.
 fn code(text: &str) -> String {
@@ -75,7 +68,7 @@ fn imports(text: &str) -> Vec<&'static str> {
 }
 
 fn room(path: &Path) -> Option<usize> {
-    let inside = path.strip_prefix(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).expect("it is in src");
+    let inside = path.strip_prefix("src").expect("it is in src");
     let first = inside.components().next().expect("it has a name").as_os_str().to_string_lossy().into_owned();
     let name = first.trim_end_matches(".rs");
     ROOMS.iter().position(|room| *room == name)
@@ -90,11 +83,10 @@ fn faults(path: &Path, text: &str) -> Vec<String> {
 
 #[test]
 fn imports_run_one_way() {
-    let mut files = Vec::new();
-    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    let files = sources();
     assert!(files.len() > 100, "{} files", files.len());
     let mut wrong = Vec::new();
-    for path in &files {
+    for (path, text) in &files {
         let name = path.file_name().expect("it has a name").to_string_lossy();
         // Files of tests alone.
         if name == "tests.rs" || name == "probe.rs" {
@@ -103,18 +95,18 @@ fn imports_run_one_way() {
         if room(path).is_none() {
             assert!(["lib.rs", "main.rs"].contains(&&*name), "{} is in no room", path.display());
         }
-        wrong.extend(faults(path, &fs::read_to_string(path).expect("it is text")));
+        wrong.extend(faults(path, text));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
 fn an_import_from_above_is_noticed() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/random/normal.rs");
-    assert!(faults(&path, "use crate::{grid, recipe::Recipe};\n").len() == 1);
-    assert!(faults(&path, "fn f() { crate::engine::open() }\n").len() == 1);
-    assert!(faults(&path, "#[cfg(test)]\nuse crate::engine::Engine;\n").is_empty());
-    assert!(faults(&path, "use crate::grid::Grid; // not crate::engine\n").is_empty());
+    let path = Path::new("src/random/normal.rs");
+    assert!(faults(path, "use crate::{grid, recipe::Recipe};\n").len() == 1);
+    assert!(faults(path, "fn f() { crate::engine::open() }\n").len() == 1);
+    assert!(faults(path, "#[cfg(test)]\nuse crate::engine::Engine;\n").is_empty());
+    assert!(faults(path, "use crate::grid::Grid; // not crate::engine\n").is_empty());
 }
 
 #[test]

@@ -3,32 +3,21 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
-use std::sync::OnceLock;
 
 use spectroll::scene::{
     Copies, GroupKind, Hue, Illuminants, IntensityScope, LrvLevels, PRESETS, PreparedScene, Scene,
     SceneBuilder, SceneSampler, Surfaces, TargetConstraint, Targets,
 };
 use spectroll::{
-    Bounds, Engine, EngineChoice, EngineError, Grid, Intensity, Model, Quantity, Recipe, Stream, colorimetry,
-    wgpu,
+    Bounds, Engine, EngineError, Grid, Intensity, Model, Quantity, Recipe, Stream, colorimetry, wgpu,
 };
 
+mod engines;
 #[path = "../examples/host/mod.rs"]
 #[allow(dead_code)] // tests render nothing
 mod host;
 
-fn gpu() -> &'static Engine {
-    static GPU: OnceLock<Engine> = OnceLock::new();
-    GPU.get_or_init(|| {
-        Engine::new(&EngineChoice::Gpu).unwrap_or_else(|e| panic!("this needs an adapter: {e}"))
-    })
-}
-
-fn cpu() -> &'static Engine {
-    static CPU: OnceLock<Engine> = OnceLock::new();
-    CPU.get_or_init(|| Engine::new(&EngineChoice::Cpu).expect("the CPU is always there"))
-}
+use engines::{cpu, gpu, gpu_is_software};
 
 fn daylight() -> Model {
     Model::builtin("granada").expect("it is built in")
@@ -101,7 +90,7 @@ fn everything() -> SceneBuilder {
 
 #[test]
 fn presets_are_the_same_on_every_engine() {
-    let software = gpu().adapter().is_some_and(|adapter| adapter.kind == "software");
+    let software = gpu_is_software();
     for (name, _) in PRESETS {
         let scene = preset(name);
         let ours = arrays(&scene, cpu(), 3..43);
@@ -286,7 +275,7 @@ fn colours_are_those_of_the_spectra() {
     const COLOURS: [Quantity; 3] = [Quantity::Xyz, Quantity::Chromaticity, Quantity::LinearSrgb];
     let scene = coloured(&[&[Quantity::Spectra], &COLOURS[..]].concat());
     let all = arrays(&scene, cpu(), 3..43);
-    if gpu().adapter().is_some_and(|adapter| adapter.kind == "software") {
+    if gpu_is_software() {
         assert!(arrays(&scene, gpu(), 3..43) == all);
     }
     let grid = Grid::DEFAULT;

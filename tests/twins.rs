@@ -4,29 +4,19 @@
 //! last digits: there a draw may take another candidate once in 10^6, and values may differ by 16 units in the last
 //! place of the largest term that made them. `WGPU_ADAPTER_NAME` picks the adapter; without one these tests fail.
 
-use std::sync::OnceLock;
+mod engines;
 
+use engines::{cpu, gpu};
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use spectroll::evaluation::statistics::tinted;
 use spectroll::{
-    Bounds, BuiltinTable, Dataset, DrawRange, DrawStatus, Engine, EngineChoice, EngineError, Extrapolation,
-    Fit, Grid, Lrv, Model, ModelParts, Real, Recipe, SpectrumKind, Stream, colorimetry,
+    Bounds, BuiltinTable, Dataset, DrawRange, DrawStatus, Engine, EngineError, Extrapolation, Fit, Grid, Lrv,
+    Model, ModelParts, Real, Recipe, SpectrumKind, Stream, colorimetry,
 };
 
 /// How far an adapter that fuses may be off, in units in the last place of the largest term.
 const ULPS: f64 = 16.0;
-
-fn gpu() -> &'static Engine {
-    static GPU: OnceLock<Engine> = OnceLock::new();
-    GPU.get_or_init(|| {
-        Engine::new(&EngineChoice::Gpu).unwrap_or_else(|e| panic!("twins need an adapter: {e}"))
-    })
-}
-
-fn cpu() -> Engine {
-    Engine::new(&EngineChoice::Cpu).expect("the CPU is always there")
-}
 
 /// A recipe, and what it was made of.
 struct Case {
@@ -163,7 +153,7 @@ fn assert_valid(case: &Case, draws: DrawRange, rows: &Rows) {
 
 /// Makes `draws` on both engines, holds them against each other and against `Recipe::draw`, and returns the CPU's.
 fn assert_twins(case: &Case, draws: DrawRange) -> Rows {
-    let (ours, theirs) = (rows(&cpu(), &case.recipe, draws), rows(gpu(), &case.recipe, draws));
+    let (ours, theirs) = (rows(cpu(), &case.recipe, draws), rows(gpu(), &case.recipe, draws));
     let adapter = gpu().adapter().expect("it draws on an adapter");
     if let Err(difference) = compare(case, draws, &ours, &theirs, adapter.kind == "software") {
         panic!("CPU against {adapter}: {difference}");
@@ -302,7 +292,7 @@ fn any_index_seed_and_stream() {
     }
     let stream = Stream::new(7);
     let around = assert_twins(&case, DrawRange { stream, first: u64::MAX - 4, count: 11 });
-    let from_zero = rows(&cpu(), &case.recipe, stream.draws(0..6));
+    let from_zero = rows(cpu(), &case.recipe, stream.draws(0..6));
     assert_eq!(around.spectra[5 * case.recipe.model().bands()..], from_zero.spectra);
 }
 
@@ -327,7 +317,7 @@ fn any_split_gives_the_same_bytes() {
     let (first, count) = ((1u64 << 32) - 5000, 10_007);
     let whole = stream.draws(first..first + count);
     let mut rng = Stream::new(9).rng();
-    for engine in [&cpu(), gpu()] {
+    for engine in [cpu(), gpu()] {
         let mut pieces = Rows { spectra: Vec::new(), statuses: Vec::new() };
         let mut next = 0;
         while next < count {
@@ -348,7 +338,7 @@ fn the_tolerance_for_hardware_is_neither_tight_nor_loose() {
     let targets = [None, Some((0.6, Bounds::Base)), Some((0.2, Bounds::Scaled))];
     for case in targets.map(|target| Case::new(&builtin("munsell-vrhel"), target, 1.0)) {
         let draws = Stream::new(10).draws(0..20_000);
-        let ours = rows(&cpu(), &case.recipe, draws);
+        let ours = rows(cpu(), &case.recipe, draws);
         let (spectra, statuses): (Vec<_>, Vec<_>) = (0..draws.count)
             .map(|i| case.recipe.draw::<f64>(draws.stream, i))
             .map(|drawn| (drawn.spectrum().to_vec(), drawn.status()))

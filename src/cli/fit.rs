@@ -63,7 +63,7 @@ fn components(text: &str) -> Result<Components, String> {
     parsed.ok_or_else(|| "expected a number of components, or a share of the variance as in 99.9%".to_owned())
 }
 
-fn factor(text: &str) -> Result<f64, String> {
+pub(super) fn factor(text: &str) -> Result<f64, String> {
     let factor = text.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0);
     factor.ok_or_else(|| "expected a number above 0".to_owned())
 }

@@ -150,13 +150,18 @@ impl Table {
 
     /// Reads a MATLAB file or an `.h5` one, or a `.csv`, `.tsv` or `.txt` file with the wavelengths in the first column
     /// and a spectrum in each other one. `variable` picks a matrix where a `.mat` or `.h5` file holds several.
-    pub fn open(path: &Path, variable: Option<&str>) -> Result<Table, DatasetError> {
+    pub fn open(path: impl AsRef<Path>, variable: Option<&str>) -> Result<Table, DatasetError> {
         Table::open_on(path, variable, None)
     }
 
     /// Reads a table as [`Table::open`] does, and also `.npy` files with spectra in rows, whose wavelengths are
     /// `grid`.
-    pub fn open_on(path: &Path, variable: Option<&str>, grid: Option<Grid>) -> Result<Table, DatasetError> {
+    pub fn open_on(
+        path: impl AsRef<Path>,
+        variable: Option<&str>,
+        grid: Option<Grid>,
+    ) -> Result<Table, DatasetError> {
+        let path = path.as_ref();
         let bytes = read_capped(path)?;
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         let mut table = match extension.as_str() {

@@ -3,6 +3,8 @@
 //! A range is cut into windows, of which a few are in flight. Where the cuts fall never shows in the draws.
 
 mod adapter;
+#[cfg(any(test, feature = "report"))]
+pub(crate) mod compute;
 mod cpu;
 mod gpu;
 mod schedule;

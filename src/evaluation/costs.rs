@@ -15,42 +15,11 @@ use crate::program::Program;
 use crate::random::stream::Stream;
 use crate::recipe::{Recipe, RecipeError};
 use crate::sampler::{Prepared, Sampler};
-use crate::wgsl::{self, Tables};
+pub use crate::wgsl::Part;
+use crate::wgsl::shader_without;
 
 /// Draws per dispatch. Their spectra stay below the least size of a buffer that a device may offer.
 const COUNT: u64 = 1 << 19;
-
-/// A part of a draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Part {
-    /// The generator's ten rounds, of each block of words.
-    Philox,
-    /// Logarithm, root, sine and cosine.
-    Normals,
-    /// All but one product of each band with the normals, both for the test and for what is stored.
-    Reconstruction,
-    /// Test that the spectrum is physical.
-    Test,
-    /// All but one of the stores of a spectrum.
-    Store,
-}
-
-impl Part {
-    /// All parts, in the order in which a draw does them.
-    pub const ALL: [Part; 5] = [Part::Philox, Part::Normals, Part::Reconstruction, Part::Test, Part::Store];
-
-    /// Name of the part.
-    pub fn name(self) -> &'static str {
-        match self {
-            Part::Philox => "Philox",
-            Part::Normals => "normals",
-            Part::Reconstruction => "reconstruction",
-            Part::Test => "test",
-            Part::Store => "store",
-        }
-    }
-}
 
 /// Share of a draw's cost that a part has.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -155,59 +124,8 @@ fn never_rejected(model: &Model) -> Result<Program, RecipeError> {
 /// Makes the sampler of a program without a part.
 fn sampler(device: &Device, program: &Program, part: Option<Part>) -> Result<Sampler, EngineError> {
     let target = Sampler::target(device);
-    let (text, tables) = match part {
-        Some(part) => without(program, target, part),
-        None => wgsl::shader(program, target),
-    };
+    let (text, tables) = shader_without(program, target, part);
     Ok(Sampler::with_text(device, program, target, text, &tables)?)
-}
-
-/// Writes the shader of a program without a part.
-fn without(program: &Program, target: wgsl::Dialect, part: Part) -> (String, Tables) {
-    let (text, tables) = wgsl::shader(program, target);
-    let text = match part {
-        // Words that still differ from draw to draw.
-        Part::Philox => with_body(&text, "philox", |_| "return counter ^ key.xyxy;".to_owned()),
-        Part::Normals => {
-            with_body(&text, "normal_pair", |_| "return vec2(f32(x), f32(y)) * 2.3283064e-10f;".to_owned())
-        }
-        Part::Reconstruction => return wgsl::shader(&one_gain_each(program), target),
-        Part::Test => with_body(&text, "is_accepted", |_| "return true;".to_owned()),
-        Part::Store => with_body(&text, "store", one_store),
-    };
-    (text, tables)
-}
-
-/// Changes a program to one product in each band, with every normal in use.
-fn one_gain_each(program: &Program) -> Program {
-    let mut program = program.clone();
-    let components = program.components();
-    for (j, gain) in program.spectrum.gain.iter_mut().enumerate() {
-        for (band, gain) in gain.iter_mut().enumerate() {
-            if band % components != j {
-                *gain = 0.0;
-            }
-        }
-    }
-    program
-}
-
-/// Replaces the body of a function in a text.
-fn with_body(text: &str, name: &str, body: impl FnOnce(&str) -> String) -> String {
-    let start = text.find(&format!("\nfn {name}(")).expect("the shader has the function");
-    let open = start + text[start..].find("{\n").expect("it has a body") + 2;
-    let close = open + text[open..].find("\n}").expect("its body ends");
-    format!("{}    {}{}", &text[..open], body(&text[open..close]), &text[close..])
-}
-
-/// Rewrites the body of `store` with one store of spectra: of the sum of all words, so that all are computed.
-fn one_store(body: &str) -> String {
-    let is_store = |line: &&str| line.trim_start().starts_with("spectra[");
-    let (stores, rest): (Vec<&str>, Vec<&str>) = body.lines().partition(|line| is_store(line));
-    let word =
-        |store: &&str| store.split_once(" = ").expect("a store assigns").1.trim_end_matches(';').to_owned();
-    let sum = stores.iter().map(word).collect::<Vec<_>>().join(" + ");
-    format!("{}\n    spectra[thread] = {sum};", rest.join("\n").trim_start())
 }
 
 #[cfg(test)]
@@ -227,9 +145,9 @@ mod tests {
     fn each_shader_is_valid_and_lacks_its_part_alone() {
         let program = never_rejected(&model()).unwrap();
         for target in [Dialect::Baseline, Dialect::Int64, Dialect::SoftwareInt64] {
-            let whole = wgsl::shader(&program, target).0;
+            let whole = shader_without(&program, target, None).0;
             for part in Part::ALL {
-                let text = without(&program, target, part).0;
+                let text = shader_without(&program, target, Some(part)).0;
                 let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{part:?}: {e}"));
                 let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_INT64);
                 validator.validate(&module).unwrap_or_else(|e| panic!("{part:?}: {e}"));

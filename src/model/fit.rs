@@ -1,10 +1,11 @@
 //! The fit of a [`Model`] to a [`Dataset`] (Singh et al. 2018, appendix, eq. 1-4 and 6-7): principal components by a
 //! singular value decomposition, in f64.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::decomposition::Decomposition;
 use crate::dataset::{Dataset, SpectrumKind};
+use crate::grid::Grid;
 use crate::model::{MAX_COMPONENTS, Model, ModelParts, Normalization};
 
 /// Settings of a fit.
@@ -167,13 +168,12 @@ impl Normalization {
     pub fn divide(self, data: &Dataset) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
         let mut spectra = data.spectra().clone();
         let mut powers = Vec::new();
+        if self == Normalization::None {
+            return Ok((spectra, powers));
+        }
         for (i, mut spectrum) in spectra.column_iter_mut().enumerate() {
             let mean = spectrum.mean();
-            let divisor = match self {
-                Normalization::None => continue,
-                Normalization::Mean => mean,
-                Normalization::Integral => spectrum.sum() * data.grid().step(),
-            };
+            let divisor = self.divisor(spectrum.as_slice(), data.grid());
             if !(mean > 0.0 && divisor.is_finite()) {
                 return Err(FitError::Power { place: data.place(i), power: mean });
             }
@@ -181,6 +181,16 @@ impl Normalization {
             powers.push(divisor);
         }
         Ok((spectra, powers))
+    }
+
+    /// Divisor of a spectrum on this grid: 1 for [`None`](Normalization::None).
+    pub fn divisor(self, spectrum: &[f64], grid: Grid) -> f64 {
+        let spectrum = DVectorView::from_slice(spectrum, spectrum.len());
+        match self {
+            Normalization::None => 1.0,
+            Normalization::Mean => spectrum.mean(),
+            Normalization::Integral => spectrum.sum() * grid.step(),
+        }
     }
 }
 
@@ -197,7 +207,7 @@ fn enough(singular: &[f64], wanted: f64) -> usize {
 mod tests {
     use super::*;
     use crate::dataset::Table;
-    use crate::grid::{Extrapolation, Grid};
+    use crate::grid::Extrapolation;
 
     #[test]
     fn percents_are_no_reflectances() {

@@ -156,7 +156,8 @@ impl Model {
     }
 
     /// Reads a model file.
-    pub fn load(path: &Path) -> Result<Model, ModelError> {
+    pub fn load(path: impl AsRef<Path>) -> Result<Model, ModelError> {
+        let path = path.as_ref();
         let name = path.display().to_string();
         if Table::may_open(path) {
             return Err(ModelError::Data { path: name });

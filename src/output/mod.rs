@@ -127,7 +127,8 @@ impl FileFormat {
     const EXTENSIONS: &str = ".npy, .npz, .csv, .h5, .mat, .parquet or .zarr";
 
     /// Returns the format that the extension of `path` names.
-    pub fn of(path: &Path) -> Result<FileFormat, OutputError> {
+    pub fn of(path: impl AsRef<Path>) -> Result<FileFormat, OutputError> {
+        let path = path.as_ref();
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("npy") => Ok(FileFormat::Npy),
             Some("npz") => Ok(FileFormat::Npz),

@@ -33,7 +33,8 @@ pub struct PendingFile {
 
 impl PendingFile {
     /// Begins a file that will appear as `path`.
-    pub fn create(path: &Path, existing: IfExists) -> Result<PendingFile, OutputError> {
+    pub fn create(path: impl AsRef<Path>, existing: IfExists) -> Result<PendingFile, OutputError> {
+        let path = path.as_ref();
         let path = path.to_owned();
         if path.is_dir() {
             return Err(OutputError::Folder { path });
@@ -177,7 +178,8 @@ fn check_folder(path: &Path, existing: IfExists, ours: FolderMark) -> Result<(),
 }
 
 /// Writes a whole file, which appears only when it is complete.
-pub fn write_file(path: &Path, existing: IfExists, bytes: &[u8]) -> Result<(), OutputError> {
+pub fn write_file(path: impl AsRef<Path>, existing: IfExists, bytes: &[u8]) -> Result<(), OutputError> {
+    let path = path.as_ref();
     let pending = PendingFile::create(path, existing)?;
     pending.file()?.write_all(bytes).map_err(|e| pending.failed(e))?;
     pending.finish()

@@ -62,7 +62,8 @@ const TARGET: [&str; 12] = [
 
 impl Scene {
     /// Reads a scene file. Models and spectra that it names are sought in its folder.
-    pub fn open(path: &Path) -> Result<Scene, SceneError> {
+    pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
+        let path = path.as_ref();
         let name = path.display().to_string();
         let text = fs::read_to_string(path).map_err(|e| {
             let place = SceneErrorPlace { file: Some(name.clone()), ..SceneErrorPlace::default() };

@@ -9,6 +9,7 @@ use wgpu::{BufferUsages, Device};
 use crate::engine::{DrawSummary, EngineError};
 use crate::quantity::Quantity;
 use crate::sampler::{Prepared, Sampler, SamplerError};
+use crate::wgsl::WORKGROUP;
 
 use super::Scene;
 use super::group::IntensityScope;
@@ -50,7 +51,8 @@ struct Group<'a> {
 /// A pass that copies shapes and multiplies them.
 struct Copied {
     bindings: wgpu::BindGroup,
-    values: u32,
+    /// Workgroups in a row, and rows of them.
+    workgroups: (u32, u32),
 }
 
 /// Uniform that the shader of copies declares as `Sizes`.
@@ -141,10 +143,12 @@ impl<'a> SceneSampler<'a> {
                 resource: buffers[binding as usize].as_entire_binding(),
             }),
         });
+        let workgroups = sizes.values.div_ceil(WORKGROUP);
+        let rows = workgroups.div_ceil(device.limits().max_compute_workgroups_per_dimension).max(1);
         let values = plan.arrays.iter().find(|array| array.quantity == Quantity::Intensity);
         Ok(Group {
             plan,
-            copied: Some(Copied { bindings, values: sizes.values }),
+            copied: Some(Copied { bindings, workgroups: (workgroups.div_ceil(rows), rows) }),
             drawn: Some(drawn),
             spectra: Some(spectra),
             values: values.map(|array| (array, intensities)).into_iter().collect(),
@@ -165,9 +169,8 @@ impl PreparedScene<'_> {
             let mut pass = encoder.begin_compute_pass(&descriptor);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &copied.bindings, &[]);
-            let workgroups = copied.values.div_ceil(64);
-            let rows = workgroups.div_ceil(65_535).max(1);
-            pass.dispatch_workgroups(workgroups.div_ceil(rows), rows, 1);
+            let (row, rows) = copied.workgroups;
+            pass.dispatch_workgroups(row, rows, 1);
         }
     }
 
@@ -238,10 +241,14 @@ fn check(device: &Device, spectra: u64, bands: usize) -> Result<u64, EngineError
     }
 }
 
+fn copies_text() -> String {
+    COPIES.replace("WORKGROUP", &WORKGROUP.to_string())
+}
+
 fn pipeline(device: &Device) -> wgpu::ComputePipeline {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("spectroll copies"),
-        source: wgpu::ShaderSource::Wgsl(COPIES.into()),
+        source: wgpu::ShaderSource::Wgsl(copies_text().into()),
     });
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some("spectroll copies"),
@@ -261,12 +268,12 @@ fn filled(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wg
 
 #[cfg(test)]
 mod tests {
-    use super::{COPIES, Sizes};
+    use super::{Sizes, copies_text};
     use crate::wgsl::layout::{assert_layout, offsets};
 
     #[test]
     fn sizes_lie_as_the_shader_reads_them() {
         let members = offsets!(Sizes: values, bands, copies, lights);
-        assert_layout(COPIES, "Sizes", &members, size_of::<Sizes>());
+        assert_layout(&copies_text(), "Sizes", &members, size_of::<Sizes>());
     }
 }

@@ -11,6 +11,7 @@ mod cover;
 #[cfg(test)]
 pub(crate) mod layout;
 mod module;
+mod part;
 #[cfg(test)]
 mod probe;
 mod store;
@@ -19,6 +20,7 @@ mod text;
 
 pub use module::WgslError;
 pub(crate) use module::module;
+pub use part::Part;
 pub(crate) use tables::Tables;
 
 use arithmetic::arithmetic;
@@ -103,18 +105,30 @@ pub(crate) fn draws_per_thread(program: &Program, target: Dialect) -> u32 {
 
 /// The fragments that make random words and normals: the whole of what does not depend on a program.
 pub(crate) fn generator(target: Dialect) -> String {
+    generator_without(target, None)
+}
+
+fn generator_without(target: Dialect, part: Option<Part>) -> String {
     let mul_wide = match target {
         Dialect::Baseline => MUL_WIDE,
         Dialect::Int64 | Dialect::SoftwareInt64 => MUL_WIDE_INT64,
     };
-    [mul_wide, PHILOX, NORMAL].join("\n")
+    let philox = if part == Some(Part::Philox) { part::PHILOX } else { PHILOX };
+    let normal = if part == Some(Part::Normals) { part::NORMAL } else { NORMAL };
+    [mul_wide, philox, normal].join("\n")
 }
 
 /// The compute shader of a program, and the numbers that it reads.
 pub(crate) fn shader(program: &Program, target: Dialect) -> (String, Tables) {
+    shader_without(program, target, None)
+}
+
+/// The compute shader of a program, which lacks a part: what it draws is wrong, and its time shows what the part costs.
+pub(crate) fn shader_without(program: &Program, target: Dialect, part: Option<Part>) -> (String, Tables) {
+    let program = &if part == Some(Part::Reconstruction) { one_gain_each(program) } else { program.clone() };
     let tables = Tables::new(program);
     let draws = draws_per_thread(program, target);
-    let mut parts = vec![functions(program, &tables, target), PARAMETERS.to_owned()];
+    let mut parts = vec![functions(program, &tables, target, part), PARAMETERS.to_owned()];
     if !tables.values.is_empty() {
         parts.push(format!("@group(0) @binding({TABLES_AT}) var<storage, read> tables: array<f32>;\n"));
     }
@@ -125,7 +139,7 @@ pub(crate) fn shader(program: &Program, target: Dialect) -> (String, Tables) {
     if target == Dialect::SoftwareInt64 && draws == 2 && elements().any(|element| element != Dtype::F16) {
         parts.push(WORDS.to_owned());
     }
-    parts.push(store(program, &tables, target));
+    parts.push(store(program, &tables, target, part));
     let drawn = if draws == 2 { "draw_at(i), draw_at(i + 1u)" } else { "draw_at(i)" };
     let main = MAIN.replace("WORKGROUP", &WORKGROUP.to_string());
     parts.push(main.replace("PER_THREAD", &format!("{draws}u")).replace("DRAWS", drawn));
@@ -133,7 +147,7 @@ pub(crate) fn shader(program: &Program, target: Dialect) -> (String, Tables) {
 }
 
 /// The functions that make a draw, down to `draw_of`.
-fn functions(program: &Program, tables: &Tables, target: Dialect) -> String {
+fn functions(program: &Program, tables: &Tables, target: Dialect, part: Option<Part>) -> String {
     let is = |word: &str| match word {
         "scaled" => program.scales(),
         "own_targets" => program.has_own_targets(),
@@ -152,15 +166,29 @@ fn functions(program: &Program, tables: &Tables, target: Dialect) -> String {
         false => "result.z, key, index, stream",
     };
     let draw = draw.replace("JUDGED", judged).replace("SCALED", scaled);
-    let mut parts = vec![generator(target), PHYSICAL.to_owned()];
+    let mut parts = vec![generator_without(target, part), PHYSICAL.to_owned()];
     if let Some(IntensityLaw::LogUniform { .. }) = program.intensity {
         parts.push(LOG_UNIFORM.replace("UNIFORM\n", UNIFORM));
     }
     if program.has_own_targets() {
         parts.push(UNIFORM.to_owned());
     }
-    parts.extend([arithmetic(program, tables), draw]);
+    parts.extend([arithmetic(program, tables, part), draw]);
     parts.join("\n")
+}
+
+/// Changes a program to one product in each band, with every normal in use.
+fn one_gain_each(program: &Program) -> Program {
+    let mut program = program.clone();
+    let components = program.components();
+    for (j, gain) in program.spectrum.gain.iter_mut().enumerate() {
+        for (band, gain) in gain.iter_mut().enumerate() {
+            if band % components != j {
+                *gain = 0.0;
+            }
+        }
+    }
+    program
 }
 
 #[cfg(test)]
@@ -339,7 +367,7 @@ mod tests {
         let lamps = || Program { intensity: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..light() };
         let generated = |program: &Program, target| {
             let tables = Tables::new(program);
-            arithmetic(program, &tables) + &store(program, &tables, target)
+            arithmetic(program, &tables, None) + &store(program, &tables, target, None)
         };
         for (name, program, target) in [
             ("illuminant", light(), Dialect::Baseline),

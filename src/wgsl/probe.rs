@@ -1,9 +1,7 @@
 //! The generator's fragments on an adapter, function by function, against their CPU twins: where a draw differs,
 //! these say which part of it does.
 
-use wgpu::BufferUsages;
-use wgpu::util::DeviceExt;
-
+use crate::engine::compute::{Compute, Words};
 use crate::engine::{Engine, EngineChoice};
 use crate::model::Model;
 use crate::program::Bounds;
@@ -44,53 +42,14 @@ fn run_with(
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {{ let i = id.x; {body} }}",
         generator(target)
     );
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: None,
-        source: wgpu::ShaderSource::Wgsl(text.into()),
-    });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: None,
-        layout: None,
-        module: &module,
-        entry_point: None,
-        compilation_options: Default::default(),
-        cache: None,
-    });
-    let size = 4 * output_words as u64;
-    let buffer = |usage| {
-        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
-    };
-    let [input, table] = [input, table].map(|words| {
-        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: None,
-            contents: bytemuck::cast_slice(words),
-            usage: BufferUsages::STORAGE,
-        })
-    });
-    let output = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-    let staging = buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
-    let entries = [&input, &output, &table].into_iter().zip(0..).filter(|(buffer, _)| buffer.size() > 0);
-    let entries: Vec<_> = entries
-        .map(|(buffer, binding)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-        .collect();
-    let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &entries,
-    });
-    let mut encoder = device.create_command_encoder(&Default::default());
-    {
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, &bindings, &[]);
-        pass.dispatch_workgroups((output_words as u32).div_ceil(64), 1, 1);
-    }
-    encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, None);
-    queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |result| result.expect("it maps"));
-    device.poll(wgpu::PollType::wait_indefinitely()).expect("the device works");
-    let words = bytemuck::cast_slice(&staging.get_mapped_range(..).expect("it is mapped")).to_vec();
-    Some(words)
+    let compute = Compute::new(
+        device,
+        queue,
+        text,
+        &[Words::Given(input), Words::Written(output_words), Words::Given(table)],
+    );
+    compute.run(&compute.pipeline("main"), output_words as u32);
+    Some(compute.read(1))
 }
 
 const PHILOX: &str = "if i < arrayLength(&output) / 4u {

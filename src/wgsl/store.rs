@@ -2,10 +2,10 @@
 
 use super::tables::Tables;
 use super::text::Text;
-use super::{Dialect, Form, OUTPUTS_AT, draws_per_thread};
+use super::{Dialect, Form, OUTPUTS_AT, Part, draws_per_thread};
 use crate::draw_status::DrawStatus;
 use crate::program::{Output, Program, Source, Unit};
-use crate::quantity::{ArrayFormat, Dtype, Layout, ValueRange};
+use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
 use crate::random::real::Arithmetic;
 
 /// Packing of an output's values into words of its buffer.
@@ -68,11 +68,14 @@ struct Store<'a> {
     form: Form,
     /// The names of the thread's draws.
     draws: &'static [&'static str],
+    /// What is left out.
+    part: Option<Part>,
 }
 
-pub(super) fn store(program: &Program, tables: &Tables, target: Dialect) -> String {
+/// Writes the stores of all but a part.
+pub(super) fn store(program: &Program, tables: &Tables, target: Dialect, part: Option<Part>) -> String {
     let draws: &[_] = if draws_per_thread(program, target) == 2 { &["a", "b"] } else { &["a"] };
-    let store = Store { program, tables, target, form: Form::of(program), draws };
+    let store = Store { program, tables, target, form: Form::of(program), draws, part };
     let mut text = Text::default();
     for output in &program.outputs {
         let ArrayFormat { quantity, dtype, .. } = output.format;
@@ -179,6 +182,12 @@ impl Store<'_> {
                 (0..width).map(run).collect()
             }
         };
+        if self.part == Some(Part::Store) && quantity == Quantity::Spectra {
+            // The sum of all words, so that all are computed.
+            let words = runs.iter().flat_map(|(_, values)| values.chunks_exact(word.values()));
+            let sum = words.map(|values| word.pack(dtype, values)).collect::<Vec<_>>().join(" + ");
+            return body.line(&format!("{quantity}[thread] = {sum};"));
+        }
         for (start, values) in runs {
             for (at, values) in values.chunks_exact(word.values()).enumerate() {
                 body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(dtype, values)));

@@ -6,14 +6,17 @@
 //! failure is never chance. Many seeds are a matter of minutes, and only run when asked for (`make exhaustive`).
 
 mod broken;
+#[path = "../engines/mod.rs"]
+mod engines;
 
 use std::f64::consts::TAU;
 
 use broken::{Fault, Pipeline};
+use engines::cpu;
 use spectroll::evaluation::statistics::{
     self, Check, EDGE, KNOWN, Sample, SampleFn, Scenario, battery, sigmas, smallest_errors,
 };
-use spectroll::{Bounds, Engine, EngineChoice, EngineError, Model, ProposalKind, Recipe, Stream};
+use spectroll::{Bounds, EngineError, Model, ProposalKind, Recipe, Stream};
 
 /// Draws of a sample of the engine, and of its reference.
 const DRAWS: u64 = 1 << 18;
@@ -41,10 +44,6 @@ fn run_checks(sampler: SampleFn, oracle: &Sample, seed: u64) -> (usize, Vec<(&'s
     (findings.len(), failed.collect())
 }
 
-fn cpu() -> Engine {
-    Engine::new(&EngineChoice::Cpu).expect("the CPU is always there")
-}
-
 /// Runs every check on the engine in every scenario, and says how many there were and what failed.
 fn judge_engine(seed: u64, draws: u64) -> (usize, Vec<String>) {
     let engine = cpu();
@@ -53,7 +52,7 @@ fn judge_engine(seed: u64, draws: u64) -> (usize, Vec<String>) {
         let oracle = statistics::oracle(&scenario, seed.wrapping_add(number), draws);
         assert!(!scenario.is_untruncated() || oracle.attempts.iter().all(|&attempts| attempts == 1.0));
         let sampler = |stream, first, count| {
-            Sample::of_engine(&scenario, &engine, stream, first, count).expect("every draw succeeds")
+            Sample::of_engine(&scenario, engine, stream, first, count).expect("every draw succeeds")
         };
         let (checks, failed) = run_checks(&sampler, &oracle, seed);
         failures.extend(failed.iter().map(|(check, e)| format!("{}, {check}: {e}", scenario.name)));

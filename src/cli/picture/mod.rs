@@ -1,6 +1,9 @@
 //! Pictures as files, for the commands that make some.
 
+mod colours;
+pub(super) mod comparison;
 pub(super) mod model;
+mod panel;
 pub(super) mod scene;
 
 use std::path::Path;

@@ -6,21 +6,13 @@
 use std::sync::Arc;
 
 use clap::ValueEnum as _;
-use kuva::prelude::{
-    BandPlot, Figure, Layout, LinePlot, Plot, ReferenceLine, ScatterPlot, TextAnnotation, TickFormat,
-};
+use kuva::prelude::{BandPlot, LinePlot, ScatterPlot, TextAnnotation, TickFormat};
 use kuva::render::render::{Primitive, Scene, TextAnchor};
-use spectroll::evaluation::plot::{self, Caption, Place, TICK_SIZE, Theme};
-use spectroll::{Grid, Intensity, Model, Recipe, RecipeSettings, SpectrumKind, Stream, colorimetry};
+use spectroll::evaluation::plot::{self, Caption, TICK_SIZE, Theme};
+use spectroll::{Intensity, Model, Recipe, RecipeSettings, SpectrumKind, Stream};
 
-/// The size of a panel; two by two make a picture.
-const PANEL: (f64, f64) = (430.0, 330.0);
-
-/// Margins of a panel for text on its left, right, top and bottom: the same for all, so that their axes align.
-const MARGINS: [f64; 4] = [70.0, 14.0, 52.0, 48.0];
-
-/// Between panels and around them.
-const GAP: f64 = 14.0;
+use super::colours::Colours;
+use super::panel::{self, Axes, MARGINS, PANEL, Panel, curve};
 
 /// The draws in the last panel.
 const DRAWS: u64 = 200;
@@ -50,29 +42,13 @@ pub(in crate::cli) struct Picture<'a> {
     pub(in crate::cli) theme: Theme,
 }
 
-/// One panel: what is drawn, on what axes, and the text around them.
-type Panel = (Vec<Plot>, Layout, Caption);
-
 impl Picture<'_> {
     /// The picture, drawn.
     pub(in crate::cli) fn drawing(&self) -> Scene {
         let draws = self.draws();
         let panels = [self.mean(), self.basis(), self.unexplained(), self.drawn(&draws)];
-        let (mut plots, mut layouts, mut text) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, (plot, layout, caption)) in panels.into_iter().enumerate() {
-            plots.push(plot);
-            layouts.push(layout);
-            text.extend(caption.draw(&place(index), self.theme));
-        }
-        let mut drawing = Figure::new(2, 2)
-            .with_plots(plots)
-            .with_layouts(layouts)
-            .with_cell_size(PANEL.0, PANEL.1)
-            .with_spacing(GAP)
-            .with_padding(GAP)
-            .render();
-        drawing.elements.extend(self.key(place(1).corner));
-        drawing.elements.extend(text);
+        let mut drawing = panel::arrange(panels, self.theme);
+        drawing.elements.extend(self.key(panel::place(1).corner));
         plot::head(&mut drawing, &super::title(self.name), &self.facts(), self.theme);
         drawing
     }
@@ -85,6 +61,10 @@ impl Picture<'_> {
             k => format!("{k} components"),
         };
         format!("{}s at {} nm, {components}; draws of seed {}", model.kind(), model.grid(), self.seed)
+    }
+
+    fn axes(&self) -> Axes {
+        Axes { kind: self.model.kind(), grid: self.model.grid(), theme: self.theme }
     }
 
     fn draws(&self) -> Vec<Vec<f64>> {
@@ -108,13 +88,13 @@ impl Picture<'_> {
             .with_opacity(0.22);
         let line =
             LinePlot::new().with_data(curve(grid, mean.as_slice())).with_color(colour).with_stroke_width(2.2);
-        let limits = self.value_limits(low.iter().chain(&high));
+        let limits = self.axes().limits(low.iter().chain(&high));
         let caption = Caption {
             title: format!("Mean {} ± 1 standard deviation", self.model.kind()),
             note: "of the model, before any recipe".to_owned(),
-            vertical: self.value_label().to_owned(),
+            vertical: self.axes().label().to_owned(),
         };
-        (vec![band.into(), line.into()], self.values(limits), caption)
+        (vec![band.into(), line.into()], self.axes().values(limits), caption)
     }
 
     /// The first basis vectors.
@@ -138,7 +118,7 @@ impl Picture<'_> {
         let limit = 1.06 * rows.iter().flatten().fold(0.0, |a: f64, v| a.max(v.abs()));
         let covered = key_height(rows.len()) / (PANEL.1 - MARGINS[2] - MARGINS[3]);
         let top = limit + 2.0 * limit * covered / (1.0 - covered);
-        let layout = self.spectra((-limit, top)).with_reference_line(self.guide(0.0));
+        let layout = self.axes().spectra((-limit, top)).with_reference_line(self.axes().guide(0.0));
         let caption = Caption {
             title,
             note: "and the share of variance that each explains".to_owned(),
@@ -225,7 +205,7 @@ impl Picture<'_> {
     /// Draws, each in its own colour.
     fn drawn(&self, draws: &[Vec<f64>]) -> Panel {
         let grid = self.model.grid();
-        let colours = Colours::new(self.model, self.theme);
+        let colours = Colours::new(self.model.kind(), self.model.grid(), self.theme);
         let stroke = match self.model.kind() {
             SpectrumKind::Reflectance => 1.15,
             SpectrumKind::Illuminant => 0.9, // they lie close together
@@ -248,52 +228,11 @@ impl Picture<'_> {
         if self.model.kind() == SpectrumKind::Reflectance && above > 0 {
             note += &format!("; {above} exceed 1");
         }
-        let caption = Caption { title, note, vertical: self.value_label().to_owned() };
+        let caption = Caption { title, note, vertical: self.axes().label().to_owned() };
         // A panel without any line would not be drawn at all.
         let none = draws.is_empty().then(|| LinePlot::new().into());
-        let limits = self.value_limits(draws.iter().flatten());
-        (draws.iter().map(line).chain(none).collect(), self.values(limits), caption)
-    }
-
-    /// Axes for values of spectra, with lines at the limits of what is physical where the axes go beyond.
-    fn values(&self, (low, high): (f64, f64)) -> Layout {
-        let mut layout = self.spectra((low, high));
-        if low < 0.0 {
-            layout = layout.with_reference_line(self.guide(0.0));
-        }
-        if self.model.kind() == SpectrumKind::Reflectance && high > 1.0 {
-            layout = layout.with_reference_line(self.guide(1.0));
-        }
-        layout
-    }
-
-    /// Axes for spectra.
-    fn spectra(&self, y: (f64, f64)) -> Layout {
-        self.theme
-            .axes(limits(self.model.grid()), y, MARGINS)
-            .with_x_label("wavelength (nm)")
-            .with_y_tick_format(TickFormat::Custom(Arc::new(spectral_value)))
-    }
-
-    fn guide(&self, y: f64) -> ReferenceLine {
-        ReferenceLine::horizontal(y).with_color(self.theme.ink()).with_stroke_width(1.0)
-    }
-
-    fn value_label(&self) -> &'static str {
-        match self.model.kind() {
-            SpectrumKind::Reflectance => "reflectance",
-            SpectrumKind::Illuminant => "relative power",
-        }
-    }
-
-    /// The limits of an axis of spectral values.
-    fn value_limits<'v>(&self, values: impl Iterator<Item = &'v f64>) -> (f64, f64) {
-        let (low, high) = values.fold((0.0, 0.0), |(a, b): (f64, f64), &v| (a.min(v), b.max(v)));
-        match self.model.kind() {
-            SpectrumKind::Reflectance if high <= 1.0 => (1.05 * low, 1.0),
-            SpectrumKind::Illuminant if high <= 0.0 => (1.05 * low, 1.0),
-            _ => (1.05 * low, 1.05 * high),
-        }
+        let limits = self.axes().limits(draws.iter().flatten());
+        (draws.iter().map(line).chain(none).collect(), self.axes().values(limits), caption)
     }
 }
 
@@ -318,61 +257,6 @@ fn described(settings: &RecipeSettings) -> String {
         Some(Intensity::Data) => parts.push("intensity of the data".to_owned()),
     }
     parts.join(", ")
-}
-
-/// Place of a panel, row by row.
-fn place(index: usize) -> Place {
-    let at = |place: usize, size: f64| GAP + place as f64 * (size + GAP);
-    Place { corner: (at(index % 2, PANEL.0), at(index / 2, PANEL.1)), size: PANEL, margins: MARGINS }
-}
-
-/// Conversion of a spectrum to a colour that shows on the ground of a theme.
-enum Colours {
-    /// Weights of X, Y and Z that make white of a perfect reflector, and the luminance it is drawn with.
-    Reflected([Vec<f64>; 3], f64),
-    /// Weights of X, Y and Z, and the luminance of all lights, whatever their power.
-    Emitted([Vec<f64>; 3], f64),
-    /// The grid has no light that the eye sees; all have this colour.
-    Unseen(&'static str),
-}
-
-impl Colours {
-    fn new(model: &Model, theme: Theme) -> Colours {
-        let grid = model.grid();
-        match (colorimetry::xyz_weights(grid), model.kind()) {
-            (None, _) => Colours::Unseen(theme.quiet()),
-            (Some(weights), SpectrumKind::Reflectance) => {
-                Colours::Reflected(weights, theme.white_luminance())
-            }
-            (Some(_), SpectrumKind::Illuminant) => {
-                Colours::Emitted(colorimetry::cmf(grid), theme.chromatic_luminance())
-            }
-        }
-    }
-
-    /// The colour of a spectrum, as `#rrggbb`.
-    fn of(&self, spectrum: &[f64]) -> String {
-        let xyz = |weights: &[Vec<f64>; 3]| {
-            [0, 1, 2].map(|i| weights[i].iter().zip(spectrum).map(|(w, s)| w * s).sum::<f64>())
-        };
-        match self {
-            Colours::Reflected(weights, white) => {
-                plot::exact_hex(colorimetry::linear_srgb(xyz(weights)).map(|v| white * v))
-            }
-            Colours::Emitted(weights, luminance) => plot::chromatic(xyz(weights), *luminance),
-            Colours::Unseen(colour) => (*colour).to_owned(),
-        }
-    }
-
-    /// Explains the colours.
-    fn note(&self) -> &'static str {
-        match self {
-            Colours::Reflected(_, 1.0) => "colours: under D65",
-            Colours::Reflected(..) => "colours: under D65, darkened to show on white",
-            Colours::Emitted(..) => "colours: of the light, at equal luminance",
-            Colours::Unseen(_) => "outside the visible",
-        }
-    }
 }
 
 /// The standard deviation of the model's spectra, band by band: the root of the diagonal of basis' . covariance .
@@ -406,20 +290,6 @@ fn percent(share: f64) -> String {
     format!("{percent:.decimals$} %")
 }
 
-/// The points of a spectrum's line. A single band is a line as wide as its step.
-fn curve(grid: Grid, values: &[f64]) -> Vec<(f64, f64)> {
-    match values {
-        [value] => [-0.5, 0.5].map(|side| (grid.first() + side * grid.step(), *value)).to_vec(),
-        _ => grid.wavelengths().zip(values.iter().copied()).collect(),
-    }
-}
-
-/// The ends of an axis of wavelengths.
-fn limits(grid: Grid) -> (f64, f64) {
-    let pad = if grid.len() == 1 { grid.step() } else { 0.0 };
-    (grid.first() - pad, grid.last() + pad)
-}
-
 /// The most entries in a row of the key, and the height of a row.
 const KEY_COLUMNS: usize = 4;
 const KEY_ROW: f64 = 18.0;
@@ -434,11 +304,6 @@ fn key_height(count: usize) -> f64 {
     count.div_ceil(KEY_COLUMNS) as f64 * KEY_ROW + 4.0
 }
 
-/// A value of a spectrum, short enough for the left margin.
-fn spectral_value(value: f64) -> String {
-    if value.abs() < 1e5 { TickFormat::Auto.format(value) } else { TickFormat::Sci.format(value) }
-}
-
 /// A power of ten, in full.
 fn decimal(value: f64) -> String {
     format!("{value:.*}", (-value.log10().floor()).clamp(0.0, 12.0) as usize)
@@ -446,6 +311,8 @@ fn decimal(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use spectroll::colorimetry;
+
     use super::*;
 
     fn drawing(model: &Model, recipe: Option<&Recipe>) -> String {
@@ -503,7 +370,7 @@ mod tests {
     #[test]
     fn a_perfect_reflector_is_white_on_dark_and_grey_on_white() {
         let model = Model::builtin("munsell-vrhel").unwrap();
-        let white = |theme: Theme| Colours::new(&model, theme).of(&[1.0; 31]);
+        let white = |theme: Theme| Colours::new(model.kind(), model.grid(), theme).of(&[1.0; 31]);
         assert_eq!(white(Theme::Dark), "#ffffff");
         let grey = white(Theme::Light);
         let channels = [1, 3, 5].map(|i| u8::from_str_radix(&grey[i..i + 2], 16).unwrap());

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::estimate::Moments;
 use super::{Bench, ReportError};
 use crate::dataset::{BuiltinTable, Dataset, SpectrumKind};
+use crate::evaluation::comparison::determinant_ratio;
 use crate::grid::Extrapolation;
 use crate::model::Model;
 use crate::program::Bounds;
@@ -123,12 +124,6 @@ fn above_one(bench: &Bench, name: &str, model: &Model, draws: u64) -> Result<Vec
         all.push(AboveOne { lrv, draws, share: count as f64 / draws as f64 });
     }
     Ok(all)
-}
-
-/// Ratio of determinants, through logarithms of pivots, since the determinants themselves may vanish.
-fn determinant_ratio(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
-    let log = |m: &DMatrix<f64>| m.symmetric_eigenvalues().iter().map(|v| v.ln()).sum::<f64>();
-    (log(a) - log(b)).exp()
 }
 
 fn spread(name: &str, count: Option<u64>, covariance: &DMatrix<f64>) -> Spread {

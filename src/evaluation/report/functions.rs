@@ -5,13 +5,12 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use wgpu::BufferUsages;
-use wgpu::util::DeviceExt;
 
 use super::engines::Subject;
 use super::estimate::median;
 use super::{Bench, ReportError};
 use crate::dataset::SpectrumKind;
+use crate::engine::compute::{Compute, Words};
 use crate::random::normal::{circle, radius};
 use crate::random::real::Real;
 use crate::random::stream::Stream;
@@ -174,62 +173,18 @@ fn time_cpu(f: impl Fn(u32, u32) -> Polar + Sync) -> f64 {
 
 fn on_device(device: &wgpu::Device, queue: &wgpu::Queue, words: &[[u32; 2]]) -> ([Vec<Polar>; 2], [f64; 2]) {
     let text = generator(wgsl::Dialect::Baseline) + &SHADER.replace("TIMED", &TIMED.to_string());
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("spectroll functions"),
-        source: wgpu::ShaderSource::Wgsl(text.into()),
-    });
-    let size = 4 * (6 * words.len() as u64).max(u64::from(THREADS));
-    let contents = bytemuck::cast_slice(words);
-    let descriptor = wgpu::util::BufferInitDescriptor { label: None, contents, usage: BufferUsages::STORAGE };
-    let input = device.create_buffer_init(&descriptor);
-    let buffer = |usage| {
-        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+    let buffers =
+        [Words::Given(words.as_flattened()), Words::Written((6 * words.len()).max(THREADS as usize))];
+    let compute = Compute::new(device, queue, text, &buffers);
+    let time = |entry: &str| {
+        let pipeline = compute.pipeline(entry);
+        compute.run(&pipeline, THREADS); // the first compiles
+        1e9 * median(&[(); 5].map(|()| compute.run(&pipeline, THREADS))) / f64::from(THREADS * TIMED)
     };
-    let output = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-    let staging = buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
-    let run = |entry: &str, threads: u32, rounds: u32| {
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: None,
-            layout: None,
-            module: &module,
-            entry_point: Some(entry),
-            compilation_options: Default::default(),
-            cache: None,
-        });
-        let bound = [&input, &output].into_iter().zip(0..);
-        let entries: Vec<_> = bound
-            .map(|(buffer, binding)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        let layout = &pipeline.get_bind_group_layout(0);
-        let bindings =
-            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries });
-        let seconds: Vec<f64> = (0..rounds)
-            .map(|_| {
-                let mut encoder = device.create_command_encoder(&Default::default());
-                {
-                    let mut pass = encoder.begin_compute_pass(&Default::default());
-                    pass.set_pipeline(&pipeline);
-                    pass.set_bind_group(0, &bindings, &[]);
-                    pass.dispatch_workgroups(threads.div_ceil(64), 1, 1);
-                }
-                let start = Instant::now();
-                queue.submit([encoder.finish()]);
-                device.poll(wgpu::PollType::wait_indefinitely()).expect("the device works");
-                start.elapsed().as_secs_f64()
-            })
-            .collect();
-        median(&seconds[1..]) // the first compiles
-    };
-    let pairs = f64::from(THREADS * TIMED);
-    let nanoseconds = ["time_own", "time_builtin"].map(|entry| 1e9 * run(entry, THREADS, 6) / pairs);
-    run("compare", words.len() as u32, 2);
-    let mut encoder = device.create_command_encoder(&Default::default());
-    encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, None);
-    queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |result| result.expect("it maps"));
-    device.poll(wgpu::PollType::wait_indefinitely()).expect("the device works");
-    let view = staging.get_mapped_range(..).expect("it is mapped");
-    let rows = bytemuck::cast_slice::<_, [Polar; 2]>(&view[..24 * words.len()]);
+    let nanoseconds = ["time_own", "time_builtin"].map(time);
+    compute.run(&compute.pipeline("compare"), words.len() as u32);
+    let results = compute.read(1);
+    let rows = bytemuck::cast_slice::<_, [Polar; 2]>(&results[..6 * words.len()]);
     ([0, 1].map(|i| rows.iter().map(|row| row[i]).collect()), nanoseconds)
 }
 

@@ -131,7 +131,7 @@ pub(super) fn two_sided(z: f64) -> f64 {
 
 /// Probability that an empirical distribution of effective size n is `distance` or more from the true one, by
 /// Kolmogorov's limit: `root` is sqrt(n) times the distance.
-pub(super) fn kolmogorov(root: f64) -> f64 {
+pub(in crate::evaluation) fn kolmogorov(root: f64) -> f64 {
     if root < 0.2 {
         return 1.0; // to 1e-12; the series would need many terms
     }
@@ -207,21 +207,26 @@ fn distribution(sample: &Sample, reference: &Sample) -> Finding {
     let (n, m) = (sample.len(), reference.len());
     let root = (n as f64 * m as f64 / (n + m) as f64).sqrt();
     for (j, (a, b)) in sample.weights.iter().zip(&reference.weights).enumerate() {
-        let (a, b) = (sorted(a), sorted(b));
-        let (mut i, mut distance) = (0, 0f64);
-        for (rank, value) in b.iter().enumerate() {
-            while i < n && a[i] < *value {
-                i += 1;
-            }
-            for rank in [rank, rank + 1] {
-                distance = distance.max((i as f64 / n as f64 - rank as f64 / m as f64).abs());
-            }
-        }
+        let distance = two_sample_distance(a, b);
         finding.compare(kolmogorov(root * distance), || {
             format!("weight {j}: distributions are {distance:.4} apart")
         });
     }
     finding
+}
+
+/// Largest distance of the distribution functions of two samples.
+pub(in crate::evaluation) fn two_sample_distance(a: &[f64], b: &[f64]) -> f64 {
+    let (a, b) = (sorted(a), sorted(b));
+    let (mut i, mut j, mut distance) = (0, 0, 0f64);
+    while i < a.len() && j < b.len() {
+        // Both functions step at a value that both samples have: they are compared after it.
+        let value = a[i].min(b[j]);
+        i += a[i..].iter().take_while(|&&v| v == value).count();
+        j += b[j..].iter().take_while(|&&v| v == value).count();
+        distance = distance.max((i as f64 / a.len() as f64 - j as f64 / b.len() as f64).abs());
+    }
+    distance
 }
 
 /// The distance of a sample from a distribution function.

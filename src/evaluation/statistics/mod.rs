@@ -16,6 +16,7 @@ mod tinted;
 
 pub use checks::{Against, CHECKS, Check, EDGE, FALSE_ALARMS, GAUSSIAN, LOW_BITS, MISSED, RUNS};
 pub use checks::{Smallest, sigmas, smallest_errors};
+pub(super) use checks::{kolmogorov, two_sample_distance};
 pub use generator::{Group, normals, of_all, uniformity};
 pub use oracle::sample as oracle;
 pub(crate) use sample::rows;

@@ -15,7 +15,8 @@ pub struct SetAudit {
 
 impl SetAudit {
     /// Reads the manifest of the set in a folder.
-    pub fn open(path: &Path) -> Result<SetAudit, OutputError> {
+    pub fn open(path: impl AsRef<Path>) -> Result<SetAudit, OutputError> {
+        let path = path.as_ref();
         let found = if path.is_dir() { Manifest::joined(path)? } else { None };
         let manifest = found.ok_or_else(|| OutputError::NotASet { path: path.to_owned() })?;
         Ok(SetAudit { root: path.to_owned(), manifest })

@@ -86,7 +86,8 @@ pub(super) fn claim(path: &Path, root: &Path, shard: Shard, start: SetMode) -> R
 }
 
 /// Seals a set whose chunks other processes have written.
-pub fn merge(path: &Path) -> Result<(), OutputError> {
+pub fn merge(path: impl AsRef<Path>) -> Result<(), OutputError> {
+    let path = path.as_ref();
     let path = PathBuf::from_iter(path.components());
     let path = match path.to_string_lossy().strip_suffix(".partial") {
         Some(name) => PathBuf::from(name),

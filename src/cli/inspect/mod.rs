@@ -9,8 +9,12 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use serde::Serialize;
+use spectroll::evaluation::comparison::ComparisonFigures;
 use spectroll::{Bounds, CoverSize, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind};
 
+mod comparison;
+
+use self::comparison::Compared;
 use super::options::RecipeArguments;
 use super::parse::grouped;
 use super::{if_exists, picture};
@@ -26,7 +30,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "START:STEP:STOP")]
     wavelengths: Option<Grid>,
 
-    /// Draw the model into this file, .svg, .png or .pdf
+    /// Draw the model, or its draws beside the data, into this file: .svg, .png or .pdf
     #[arg(short, long, value_name = "PATH")]
     pub(crate) output: Option<PathBuf>,
 
@@ -34,9 +38,12 @@ pub(crate) struct Arguments {
     ground: picture::Ground,
 
     #[command(flatten)]
+    data: comparison::Arguments,
+
+    #[command(flatten)]
     request: RecipeArguments,
 
-    /// The seed of the draws in the picture
+    /// The seed of the draws in the picture, and of those that are compared with data
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
 
@@ -54,19 +61,31 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
     let model = super::model_at(&arguments.model, arguments.wavelengths)?;
     let recipe = arguments.request.recipe(&model);
+    let compared = match &recipe {
+        Ok(recipe) => arguments.data.compare(recipe, arguments.seed)?,
+        Err(refused) if arguments.data.is_asked() => return Err(refused.clone().into()),
+        Err(_) => None,
+    };
     if let (Some(path), Some(format)) = (&arguments.output, format) {
-        let figure = picture::model::Picture {
-            name: &arguments.model,
-            model: &model,
-            recipe: recipe.as_ref().ok(),
-            seed: arguments.seed,
-            theme: arguments.ground.theme(),
+        let (name, model, theme) = (arguments.model.as_str(), &model, arguments.ground.theme());
+        let drawing = match &compared {
+            Some(compared) => {
+                let (note, comparison) = (&compared.note(), &compared.comparison);
+                picture::comparison::Picture { name, note, model, comparison, theme }.drawing()
+            }
+            None => {
+                let (recipe, seed) = (recipe.as_ref().ok(), arguments.seed);
+                picture::model::Picture { name, model, recipe, seed, theme }.drawing()
+            }
         };
-        picture::write(&figure.drawing(), path, format, if_exists(arguments.force))?;
+        picture::write(&drawing, path, format, if_exists(arguments.force))?;
     }
     let text = match arguments.json {
-        true => serde_json::to_string_pretty(&Facts::of(&arguments.model, &model, &recipe))? + "\n",
-        false => table(&arguments.model, &model, &recipe),
+        true => {
+            serde_json::to_string_pretty(&Facts::of(&arguments.model, &model, &recipe, compared.as_ref()))?
+                + "\n"
+        }
+        false => table(&arguments.model, &model, &recipe, compared.as_ref()),
     };
     std::io::stdout().lock().write_all(text.as_bytes())?;
     Ok(())
@@ -89,6 +108,9 @@ struct Facts<'a> {
     refused: Option<String>,
     mean: &'a [f64],
     components: Vec<Component>,
+    /// Draws beside measured spectra, where those are given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    comparison: Option<&'a ComparisonFigures>,
 }
 
 #[derive(Serialize)]
@@ -101,7 +123,12 @@ struct Component {
 }
 
 impl<'a> Facts<'a> {
-    fn of(name: &'a str, model: &'a Model, recipe: &Result<Recipe, RecipeError>) -> Facts<'a> {
+    fn of(
+        name: &'a str,
+        model: &'a Model,
+        recipe: &Result<Recipe, RecipeError>,
+        compared: Option<&'a Compared>,
+    ) -> Facts<'a> {
         let parts = model.parts();
         let component = |index: usize| Component {
             explained_variance_percent: 100.0 * parts.explained_variance[index],
@@ -123,12 +150,18 @@ impl<'a> Facts<'a> {
             refused: recipe.as_ref().err().map(RecipeError::to_string),
             mean: parts.mean.as_slice(),
             components: (0..model.components()).map(component).collect(),
+            comparison: compared.map(|compared| &compared.figures),
         }
     }
 }
 
 /// Everything that is printed.
-fn table(name: &str, model: &Model, recipe: &Result<Recipe, RecipeError>) -> String {
+fn table(
+    name: &str,
+    model: &Model,
+    recipe: &Result<Recipe, RecipeError>,
+    compared: Option<&Compared>,
+) -> String {
     let grid = model.grid();
     let mut text = String::new();
     line(&mut text, "model", name);
@@ -150,8 +183,16 @@ fn table(name: &str, model: &Model, recipe: &Result<Recipe, RecipeError>) -> Str
         }
         Err(e) => line(&mut text, "refused", &e.to_string()),
     }
+    if let Some(compared) = compared {
+        line(&mut text, "compared", &compared.note());
+        line(&mut text, "", &compared.sentence());
+    }
     text.push('\n');
     components(&mut text, model);
+    if let Some(compared) = compared {
+        text.push('\n');
+        text += &compared.table(model);
+    }
     text
 }
 
@@ -287,7 +328,7 @@ mod tests {
     fn the_table_fits_80_columns_and_has_a_row_a_component() {
         for &name in Model::BUILTIN {
             let model = Model::builtin(name).unwrap();
-            let table = table(name, &model, &Recipe::builder(&model).build());
+            let table = table(name, &model, &Recipe::builder(&model).build(), None);
             assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
             let rows = table.lines().skip_while(|line| !line.starts_with("component ")).count();
             assert_eq!(rows, 2 + model.components(), "{table}");

@@ -1,0 +1,153 @@
+//! The comparison of a model's draws with measured spectra, as a table.
+
+use std::fmt::Write as _;
+
+use spectroll::evaluation::comparison::{Comparison, ComparisonFigures, Moments};
+use spectroll::{Dataset, Extrapolation, Model, Recipe, SpectrumKind, Stream, Table};
+
+use crate::cli::exit::Usage;
+use crate::cli::parse::grouped;
+
+/// Number of draws that are compared with the data.
+const DRAWS: u64 = 20_000;
+
+/// Data to compare draws with.
+#[derive(clap::Args)]
+pub(super) struct Arguments {
+    /// Compare the draws with these measured spectra: files as `fit` reads them, or munsell, vrhel, granada
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    data: Vec<String>,
+    /// Multiply the data by this, as `fit --scale`
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", value_parser = crate::cli::fit::factor, requires = "data")]
+    scale: f64,
+}
+
+impl Arguments {
+    /// Whether there are data.
+    pub(super) fn is_asked(&self) -> bool {
+        !self.data.is_empty()
+    }
+
+    /// Compares the data with draws of `seed`; `None` where there are no data.
+    pub(super) fn compare(&self, recipe: &Recipe, seed: u64) -> anyhow::Result<Option<Compared>> {
+        if !self.is_asked() {
+            return Ok(None);
+        }
+        let model = recipe.model();
+        let table =
+            |name: &String| anyhow::Ok(crate::cli::fit::table(name, Some(model.grid()))?.scaled(self.scale));
+        let tables = self.data.iter().map(table).collect::<anyhow::Result<Vec<Table>>>()?;
+        if let Some(other) = tables.iter().find(|table| table.kind().is_some_and(|kind| kind != model.kind()))
+        {
+            return Err(Usage(format!(
+                "--data {}: the model is one of {}s, and these are not",
+                other.name(),
+                model.kind()
+            ))
+            .into());
+        }
+        let data = Dataset::new(&tables, model.grid(), Extrapolation::Error)?;
+        let mean = data.spectra().mean();
+        if model.kind() == SpectrumKind::Reflectance && mean > 1.0 {
+            return Err(Usage(format!(
+                "the data are reflectances of {mean:.4} on average; where these are percentages, pass --scale 0.01"
+            ))
+            .into());
+        }
+        let comparison = Comparison::new(recipe, &data, Stream::new(seed), DRAWS)?;
+        Ok(Some(Compared {
+            figures: comparison.figures(),
+            comparison,
+            sources: data.sources().join(", "),
+            seed,
+        }))
+    }
+}
+
+/// A comparison and its sources.
+pub(super) struct Compared {
+    pub(super) comparison: Comparison,
+    pub(super) figures: ComparisonFigures,
+    sources: String,
+    seed: u64,
+}
+
+impl Compared {
+    /// Describes what is compared.
+    pub(super) fn note(&self) -> String {
+        format!("{} and {} draws of seed {}", self.sources, grouped(self.figures.draws as u64), self.seed)
+    }
+
+    /// How far the draws are from the data, in a sentence.
+    pub(super) fn sentence(&self) -> String {
+        let weights = self.figures.weights.iter().enumerate();
+        let farthest = weights.clone().max_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+        let (at, weight) = farthest.expect("a model has components");
+        let mut text = format!(
+            "draws are farthest from the data in weight {}: its mean is off by {:.2} standard deviations, and the two \
+             distributions are {:.3} apart (Kolmogorov-Smirnov)",
+            at + 1,
+            weight.mean_shift.abs(),
+            weight.distance
+        );
+        if let Some(ratio) = self.figures.determinant_ratio {
+            let _ =
+                write!(text, "; the determinant of their covariance is {:.1} % of the data's", 100.0 * ratio);
+        }
+        text
+    }
+
+    /// A row a weight, and a row a coordinate of colours.
+    pub(super) fn table(&self, model: &Model) -> String {
+        let mut text = String::new();
+        let _ = writeln!(
+            text,
+            "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}{:>9}",
+            "weight", "mean of", "sd of", "skewness", "skewness", "Kolmogorov", "p"
+        );
+        let _ = writeln!(
+            text,
+            "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}{:>9}",
+            "", "draws, sd", "draws, sd", "of data", "of draws", "-Smirnov", ""
+        );
+        for (index, weight) in self.figures.weights.iter().enumerate() {
+            let _ = writeln!(
+                text,
+                "{:>9}{:>11.3}{:>11.3}{:>11.2}{:>11.2}{:>11.3}{:>9}",
+                index + 1,
+                weight.mean_shift,
+                weight.drawn.sd / weight.measured.sd,
+                weight.measured.skewness,
+                weight.drawn.skewness,
+                weight.distance,
+                p_value(weight.p_value),
+            );
+        }
+        let under = match model.kind() {
+            SpectrumKind::Reflectance => "under D65",
+            SpectrumKind::Illuminant => "of the light",
+        };
+        if !self.figures.colours.is_empty() {
+            let _ = writeln!(text, "\n{:>9}{:>20}{:>20}   CIE 1931, {under}", "", "data", "draws");
+        }
+        for colour in &self.figures.colours {
+            let pair = |Moments { mean, sd, .. }: Moments| format!("{mean:.4} ± {sd:.4}");
+            let _ = writeln!(
+                text,
+                "{:>9}{:>20}{:>20}",
+                if colour.name == "lrv" { "LRV" } else { colour.name },
+                pair(colour.measured),
+                pair(colour.drawn)
+            );
+        }
+        text
+    }
+}
+
+fn p_value(p: f64) -> String {
+    match p {
+        ..1e-9 => "< 1e-9".to_owned(),
+        ..0.001 => format!("{p:.0e}"),
+        _ => format!("{p:.3}"),
+    }
+}
