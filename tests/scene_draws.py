@@ -87,7 +87,8 @@ class Stream:
 
     def normals(self, place, scene, attempt, count):
         """Normals of Box and Muller, and the radius of each."""
-        u = uniform(np.hstack([self.words(place, scene, attempt, block) for block in range(-(-count // 4))]))
+        blocks = np.arange(-(-count // 4))
+        u = uniform(self.words(place[:, None], scene[:, None], attempt[:, None], blocks)).reshape(len(attempt), -1)
         radius, angle = np.sqrt(-2 * np.log(u[:, 0::2])), 2 * np.pi * u[:, 1::2]
         pairs = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
         return pairs.reshape(u.shape)[:, :count], np.repeat(radius, 2, axis=1)[:, :count]
@@ -240,7 +241,7 @@ class Draws:
     def accepted(self, attempts, tally):
         """Spectra of all draws, and how far off they may be, if each is the first that can be accepted."""
         # What several elements share is drawn once.
-        _, first, each = np.unique((self.row << 32) + self.place, return_index=True, return_inverse=True)
+        _, first, each = np.unique(self.row * 2**16 + self.place, return_index=True, return_inverse=True)
         tries, each = attempts.flat[first], each.reshape(attempts.shape)
         if tries.min() < 1 or tries.max() > 10_000 or np.any(attempts != tries[each]):
             raise Disagreement(f"attempts of {self.group['name']} are {attempts.tolist()}")
@@ -388,7 +389,7 @@ class Generator:
         lrv = pick([low, between(low, high, count), {"from": low, "to": high, "levels": count},
                     {"uniform": [low, between(0.5, 0.95)]}])
         copies = ["same_shape", "independent"] if "uniform" in str(lrv) else ["same_shape", "scaled", "scaled"]
-        hue = {"levels": count, "saturation": sorted(between(0, 0.4, 2)), "lightness": sorted(between(0.2, 0.6, 2))}
+        hue = {"levels": 1 + count % 3, "saturation": sorted(between(0, 0.3, 2)), "lightness": sorted(between(0.25, 0.6, 2))}
         law = pick([between(0.1, 9), {"from_data": True}, {"log_uniform": [low, low * between(1.5, 10_000)]}])
         if isinstance(law, dict) and self.some(0.5):
             law["shared"] = True
@@ -423,7 +424,8 @@ class Generator:
         index, attempt = np.repeat(np.arange(24), 40), np.tile(np.arange(40), 24)
         room = [Draws(file, group, scene, 0 * scene).candidates(index, attempt)[2].reshape(24, 40) for group in hardest]
         share = min(np.mean(room > 0, axis=1 if "hue" in group else None).min() for room in room)
-        is_plain = "hue" in group or "uniform" in str(group.get("lrv")) or len(file["models"][group["model"]].basis) > 12
+        normals = len(file["models"][group["model"]].basis) - 3 * ("xyz" in group)
+        is_plain = "hue" in group or "uniform" in str(group.get("lrv")) or normals > 12
         return share > (0.03 if is_plain else 0.6) and (share < 0.95 or self.some(0.2))
 
     def file(self, number, count):
@@ -433,6 +435,7 @@ class Generator:
         end = self.pick([2**16, 2**20, 2**31, 2**32 - 5, int(self.random.integers(SCENES, 2**32 - 5))]) + 5
         file = dict(name=f"{number}.toml", seed=int(self.random.integers(2**63)), window=(end - SCENES, end),
                     observer=observer, models=models, groups=[])
+        count = self.random.integers(1, count + 1)
         while len(file["groups"]) < count:
             group = self.group(models)
             if self.is_fit(file, group):

@@ -79,23 +79,27 @@ def main(condition, path):
     granada, munsell = Model("granada"), Model("munsell-vrhel")
     lights, background, target = data["lights"], data["background"], data["target"]
     scenes, bands = len(target), 31
-    assert lights.shape == (scenes, 3, bands) and target.shape == (scenes, 1, bands)
+    assert target.shape == (scenes, 1, bands)
     assert background.shape == ((scenes,) if condition == "condition3" else ()) + (999, bands)
     print(condition)
 
-    # One scale a scene, log-uniform.
-    scale = data["lights_intensity"]
-    assert scale.shape == (scenes,) and 0.15 <= scale.min() and scale.max() <= 150
-    uniform = np.log(scale / 0.15) / np.log(1000)
-    check("intensities: Kolmogorov-Smirnov", stats.kstest(uniform, "uniform").pvalue)
-    shapes = lights / scale[:, None, None]
-    assert np.all(shapes > 0)
     if condition == "condition1":
-        assert np.abs(shapes / shapes[0] - 1).max() < 1e-5, "the lights are fixed"
+        # One light for all lights of all scenes, as it was drawn.
+        assert lights.shape == (3, bands) and "lights_intensity" not in data
+        assert np.all(lights == lights[0]) and np.all(lights > 0)
+        assert abs(lights[0].mean() - 1) < 1e-5, "no factor"
     else:
+        # One scale a scene, log-uniform.
+        assert lights.shape == (scenes, 3, bands)
+        scale = data["lights_intensity"]
+        assert scale.shape == (scenes,) and 0.15 <= scale.min() and scale.max() <= 150
+        uniform = np.log(scale / 0.15) / np.log(1000)
+        check("intensities: Kolmogorov-Smirnov", stats.kstest(uniform, "uniform").pvalue)
+        shapes = lights / scale[:, None, None]
+        assert np.all(shapes > 0)
         same_moments("lights", granada.project(shapes.reshape(-1, bands)),
                      granada.project(granada.candidates(random, 200_000)))
-    assert np.abs(shapes[:, 0] / shapes[:, 1] - 1).max() > 0.01, "the lights of a scene differ in shape"
+        assert np.abs(shapes[:, 0] / shapes[:, 1] - 1).max() > 0.01, "the lights of a scene differ in shape"
 
     # The background.
     assert np.all((background > 0) & (background < 1))
