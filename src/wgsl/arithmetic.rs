@@ -172,12 +172,17 @@ fn forms(text: &mut Text, name: &str, map: &Affine) {
 fn looped(program: &Program, tables: &Tables) -> Text {
     let (n, k) = (program.bands(), program.components());
     let mut text = Text::default();
-    for (name, value) in [("BANDS", n), ("COMPONENTS", k), ("BLOCKS", k.div_ceil(4))] {
+    for (name, value) in [("BANDS", n), ("BLOCKS", k.div_ceil(4))] {
         text.line(&format!("const {name} = {value}u;"));
     }
     text.line("");
     text.0 += LOOPED;
-    text.line("");
+    text.line("\n// A row of the model: a band, or a value of another quantity.");
+    text.line("fn form(z: ptr<function, Normals>, row: u32) -> f32 {");
+    text.line(&format!("    let start = row * {}u;", k + 1));
+    text.line("    var s = tables[start];");
+    (0..k).for_each(|j| text.line(&format!("    s += tables[start + {}u] * (*z)[{j}];", j + 1)));
+    text.line("    return s;\n}\n");
     match &program.proposal {
         Some(proposal) => text.0 += &proposal.rounded::<f32>().text(4 * k.div_ceil(4), COVER_AT),
         None => text.0 += NORMALS,

@@ -103,12 +103,12 @@ impl Compared {
         let _ = writeln!(
             text,
             "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}{:>9}",
-            "weight", "mean of", "sd of", "skewness", "skewness", "Kolmogorov", "p"
+            "weight", "shift of", "ratio of", "skewness", "skewness", "Kolmogorov", "p"
         );
         let _ = writeln!(
             text,
-            "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}{:>9}",
-            "", "draws, sd", "draws, sd", "of data", "of draws", "-Smirnov", ""
+            "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}",
+            "", "mean, sd", "sds", "of data", "of draws", "-Smirnov"
         );
         for (index, weight) in self.figures.weights.iter().enumerate() {
             let _ = writeln!(
