@@ -17,9 +17,10 @@ demo:
 test: driver python
 	cargo test --locked --release
 
-# What takes minutes: all 2^32 words through the radius and the circle, and the statistics under 200 seeds.
-exhaustive:
-	cargo test --locked --release --lib --test statistics -- --ignored --nocapture
+# What takes minutes: all 2^32 words through the radius and the circle, the statistics under 200 seeds, and the fit on
+# 100,000 matrices and 1,000 small files.
+exhaustive: python
+	cargo test --locked --release --lib --test statistics --test fit -- --ignored --nocapture
 
 # In-process and whole-process rates, beside NumPy and Numba.
 bench: driver python
