@@ -213,7 +213,7 @@ fn draws_are_shown_beside_the_data() {
     assert!(text.lines().all(|line| line.chars().count() <= 80 && line.trim_end() == line), "{text}");
     for (arguments, code, message) in [
         ("munsell-vrhel --data granada", 2, "the model is one of reflectances, and these are not"),
-        ("munsell-vrhel --data none.csv", 1, "cannot read"),
+        ("munsell-vrhel --data none.csv", 4, "cannot read"),
         ("munsell-vrhel --data munsel", 2, "did you mean munsell"),
         ("munsell-vrhel --data munsell --scale 100", 2, "pass --scale 0.01"),
         ("munsell-vrhel --scale 2", 2, "--data"),

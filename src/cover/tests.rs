@@ -79,7 +79,7 @@ fn probabilities_are_those_of_other_methods() {
 
 /// Integral of a density from `low` to `high`, by Simpson's rule.
 fn integral(low: f64, high: f64, density: impl Fn(f64) -> f64) -> f64 {
-    const STEPS: u32 = 2000;
+    const STEPS: u32 = 8000;
     let width = (high - low) / f64::from(STEPS);
     let term = |i: u32| {
         let factor = if i == 0 || i == STEPS { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
