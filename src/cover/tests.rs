@@ -120,7 +120,8 @@ fn every_box_is_proposed_as_often_as_it_has_mass() {
             let found = cover.mass() * shares[i] as f64 / 2f64.powi(32) * (-proposal.costs[i] / 2.0).exp();
             // Both to 10^-9; and words come one at a time.
             let error = (found - wanted).abs() - 2f64.powi(-32) * cover.mass();
-            assert!(proposal.costs[i] >= 0.0 && error < 1e-9 * wanted, "box {i}: {found:e} for {wanted:e}");
+            let cost = proposal.costs[i];
+            assert!(cost > -1e-12 && error < 1e-9 * wanted, "box {i}: {found:e} for {wanted:e}, cost {cost:e}");
             worst = worst.max((found / wanted - 1.0).abs());
         }
         println!("LRV {lrv:?}, covariance x{scale}: odds of {} boxes to {worst:.1e}", cover.len());

@@ -116,10 +116,14 @@ pub(crate) fn attempts_per_dispatch(program: &Program, target: Dialect) -> u32 {
     let (stores, candidate) = match Form::of(program) {
         Form::Unrolled => (0, 1),
         Form::Looped => {
+            let value = 1 + arithmetic::tiles(program.components());
             let strides: usize = program.outputs.iter().map(|output| output.format.stride()).sum();
-            let bands = program.bands() * (1 + usize::from(program.target.is_some()));
+            // A target takes the luminance too, for each candidate, and to scale and to judge the one that is stored.
+            let has_target = usize::from(program.target.is_some());
+            let candidate = (1 + has_target) * program.bands() * value;
             // Halves are stored in a loop of two within another.
-            (4 * strides + bands, 1 + bands + program.components().div_ceil(4))
+            let stores = (2 + value) * strides + 2 * has_target * program.bands() * value;
+            (stores, 1 + candidate + program.components().div_ceil(4))
         }
     };
     let draws = u64::from(draws_per_thread(program, target));
