@@ -121,7 +121,10 @@ fn every_box_is_proposed_as_often_as_it_has_mass() {
             // Both to 10^-9; and words come one at a time.
             let error = (found - wanted).abs() - 2f64.powi(-32) * cover.mass();
             let cost = proposal.costs[i];
-            assert!(cost > -1e-12 && error < 1e-9 * wanted, "box {i}: {found:e} for {wanted:e}, cost {cost:e}");
+            assert!(
+                cost > -1e-12 && error < 1e-9 * wanted,
+                "box {i}: {found:e} for {wanted:e}, cost {cost:e}"
+            );
             worst = worst.max((found / wanted - 1.0).abs());
         }
         println!("LRV {lrv:?}, covariance x{scale}: odds of {} boxes to {worst:.1e}", cover.len());
