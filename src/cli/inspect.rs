@@ -12,7 +12,7 @@ use serde::Serialize;
 use spectroll::{Bounds, CoverSize, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind};
 
 use super::options::RecipeArguments;
-use super::parse::grouped;
+use super::parse::{grouped, number};
 use super::{if_exists, picture};
 
 /// Show the contents of a model: a table, and a picture where asked
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     request: RecipeArguments,
 
     /// The seed of the draws in the picture
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = number, allow_negative_numbers = true)]
     pub(crate) seed: u64,
 
     /// Print all of it as JSON
