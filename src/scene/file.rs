@@ -285,11 +285,18 @@ impl Reader<'_> {
             path => Table::open(&self.folder.join(path), None),
         };
         let wrong = |e: DatasetError| entry.wrong(SceneErrorKind::Mean(e));
-        let data = Dataset::new(&[table.map_err(wrong)?], grid, Extrapolation::Error).map_err(wrong)?;
-        match data.spectra().ncols() {
-            1 => Ok(data.spectra().column(0).iter().copied().collect()),
-            found => Err(entry.wrong(SceneErrorKind::Means { found })),
+        let tables = [table.map_err(wrong)?];
+        let data = Dataset::new(&tables, grid, Extrapolation::Error).map_err(wrong)?;
+        let found = data.spectra().ncols();
+        if found != 1 {
+            return Err(entry.wrong(SceneErrorKind::Means { found }));
         }
+        let mut measured = tables[0].wavelengths().iter().zip(tables[0].spectrum(0));
+        if let Some((&wavelength, &power)) = measured.find(|(_, power)| **power < 0.0) {
+            return Err(entry.wrong(SceneErrorKind::NegativeMean { power, wavelength }));
+        }
+        // A spline between zeros and a peak may dip below 0, which no light does.
+        Ok(data.spectra().column(0).iter().map(|power| power.max(0.0)).collect())
     }
 }
 
