@@ -34,8 +34,8 @@ pub(in crate::cli) struct OutputArguments {
           value_parser = clap::value_parser!(i32).range(1..=22))]
     zstd: Option<i32>,
     /// Make only the I-th of N parts of a .zarr or FOLDER/; auto takes them from Slurm's or Kubernetes' variables, which
-    /// a --dry-run does without
-    #[arg(long, value_name = "I/N|auto|auto/N")]
+    /// a --dry-run does without, and auto/1-8 of jobs first submitted with --array=1-8
+    #[arg(long, value_name = "I/N|auto|auto/N|auto/FIRST-LAST")]
     shard: Option<ShardName>,
     /// Go on with a .zarr or FOLDER/ that an earlier run began, if one did
     #[arg(long)]
