@@ -28,8 +28,12 @@ const MOST_DRAWS: f64 = 1e4;
 const MOST_SCENES: u64 = 4;
 
 /// The only task of a Slurm array job, for `--shard auto`.
-const SLURM: [(&str, &str); 3] =
-    [("SLURM_ARRAY_TASK_ID", "1"), ("SLURM_ARRAY_TASK_MIN", "1"), ("SLURM_ARRAY_TASK_COUNT", "1")];
+const SLURM: [(&str, &str); 4] = [
+    ("SLURM_ARRAY_TASK_ID", "1"),
+    ("SLURM_ARRAY_TASK_MIN", "1"),
+    ("SLURM_ARRAY_TASK_MAX", "1"),
+    ("SLURM_ARRAY_TASK_COUNT", "1"),
+];
 
 /// Something that a document has its reader do.
 #[derive(Clone, Debug, PartialEq)]

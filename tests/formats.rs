@@ -100,7 +100,7 @@ fn shared_arrays_have_the_type_that_was_asked_for() {
              a = np.load('a.npz')['background'].astype('{name}')\n\
              bs = [np.load('b.npz')['background'], h5py.File('b.h5')['background'][:], \
              zarr.open('b.zarr', mode='r')['background'][:], np.load('b/background.npy')]\n\
-             print([b.dtype == a.dtype and (b == a).mean() > 0.999 for b in bs], \
+             print([bool(b.dtype == a.dtype and (b == a).mean() > 0.999) for b in bs], \
              np.load('b.npz')['background_attempts'].dtype)"
         );
         assert_eq!(python(folder, &code), "[True, True, True, True] uint32", "{dtype}");

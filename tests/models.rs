@@ -217,7 +217,7 @@ fn draws_are_shown_beside_the_data() {
         ("munsell-vrhel --data munsel", 2, "did you mean munsell"),
         ("munsell-vrhel --data munsell --scale 100", 2, "pass --scale 0.01"),
         ("munsell-vrhel --scale 2", 2, "--data"),
-        ("munsell-vrhel --lrv 0.999 --data munsell", 1, "0.995928"),
+        ("munsell-vrhel --lrv 0.999 --data munsell", 2, "0.995928"),
     ] {
         fails(folder.path(), &format!("inspect {arguments}"), code, message);
     }

@@ -316,6 +316,8 @@ def expected(file, group, attempts, tally):
     if varies:
         pair = intensity, relative * intensity
         put("intensity", *([v[:, 0] for v in pair] if group["intensity"].get("shared") else pair))
+    elif "intensity" in group:
+        put("intensity", intensity, once=True)
     for quantity in group.get("quantities", ["spectra"]):
         if f"{name}_{quantity}" not in arrays:
             weights = file.observer.weights(group["kind"])
@@ -404,7 +406,7 @@ class Generator:
         is_light, is_target = what == "illuminant", what not in ("illuminant", "surface")
         name = pick("abcXYZ") + "".join(pick("abcdefghijklmnopqrstuvwxyzABCDEFG0123456789-_") for _ in range(6))
         low, high = between(0.05, 0.3), between(0.35, 0.6)
-        lrv = pick([low, between(low, high, count), {"from": low, "to": high, "levels": count},
+        lrv = pick([low, between(low, high, count), {"from": low, "to": high, "levels": 1 + count},
                     {"uniform": [low, between(0.5, 0.95)]}])
         copies = ["same_shape", "independent"] if "uniform" in str(lrv) else ["same_shape", "scaled", "scaled"]
         hue = dict(levels=1 + count % 3, saturation=sorted(between(0, 0.3, 2)), lightness=sorted(between(0.25, 0.6, 2)))
@@ -425,7 +427,7 @@ class Generator:
             "lrv": {"lrv": (1, lrv), "bounds": (0.7, pick(["base", "scaled", "both"])), "copies": (0.5, pick(copies))},
             "hue": {"hue": (1, hue)},
             "xyz": {"xyz": (1, xyz.tolist())},
-            "flat": {"flat": (1, True), "lrv": (0.7, lrv), "model": (0, None)}
+            "flat": {"flat": (1, True), "lrv": (0.7, lrv)} | {key: (0, None) for key in ("model", "cov_scale", "max_attempts")}
         }[what]
         taken = {key: value for key, (share, value) in options.items() if self.some(share)}
         return {"kind": "target" if is_target else what, "name": name} | taken

@@ -58,10 +58,12 @@ fn of_engine(error: &EngineError) -> u8 {
 }
 
 fn of_output(error: &OutputError) -> u8 {
-    use OutputError::{Cannot, Damaged, NotBuilt, NotStreamed, UnknownFormat};
+    use OutputError::{
+        Cannot, Damaged, DamagedParts, Manifest, NotBuilt, NotStreamed, UnknownFormat, Unrepaired,
+    };
     match error {
         UnknownFormat { .. } | Cannot { .. } | NotBuilt { .. } | NotStreamed => 2,
-        Damaged { .. } => 5,
+        Damaged { .. } | DamagedParts { .. } | Manifest { .. } | Unrepaired { .. } => 5,
         _ => 1,
     }
 }
@@ -85,10 +87,15 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
     if let Some(error) = output {
         return match error {
             OutputError::UnknownFormat { .. } => " (--format)",
-            OutputError::Exists { .. }
-            | OutputError::FolderExists { .. }
-            | OutputError::ManyFiles { .. }
-            | OutputError::Damaged { .. } => " (--force does)",
+            OutputError::Exists { .. } | OutputError::FolderExists { .. } | OutputError::ManyFiles { .. } => {
+                " (--force does)"
+            }
+            OutputError::Damaged { .. } => " (`spectroll verify --repair`, or --force)",
+            OutputError::DamagedParts { .. } => " (--resume)",
+            OutputError::ManifestVersion { .. }
+            | OutputError::Manifest { .. }
+            | OutputError::Unrepaired { .. } => " (--force replaces the set)",
+            OutputError::NothingMade { .. } => ": make each with --shard I/N --resume",
             OutputError::Unfinished { .. } => " (--resume or --force)",
             OutputError::NoSpace { .. } => " (--force-space overrides)",
             OutputError::NotStreamed => " (--format csv or npy)",

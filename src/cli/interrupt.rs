@@ -24,6 +24,17 @@ pub(super) fn watch() {
     };
     register(signal_hook::consts::SIGINT);
     register(signal_hook::consts::SIGTERM);
+    // Schedulers send these before they kill a job, and the system as a limit of time or size is reached.
+    #[cfg(unix)]
+    for signal in [
+        signal_hook::consts::SIGUSR1,
+        signal_hook::consts::SIGUSR2,
+        signal_hook::consts::SIGQUIT,
+        signal_hook::consts::SIGXCPU,
+        signal_hook::consts::SIGXFSZ,
+    ] {
+        register(signal);
+    }
     #[cfg(unix)]
     if !is_ignored(signal_hook::consts::SIGHUP) {
         register(signal_hook::consts::SIGHUP);

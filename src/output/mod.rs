@@ -8,6 +8,7 @@ mod byte_count;
 mod csv;
 #[cfg(feature = "hdf5")]
 mod h5;
+mod lock;
 mod mat;
 mod npy;
 mod npz;
@@ -27,7 +28,9 @@ pub use byte_count::ByteCount;
 pub(crate) use pending::available_space;
 pub use pending::{FolderMark, IfExists, PendingFile, PendingFolder, write_file};
 pub use schema::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
-pub use set::{ChunkFormat, Progress, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge};
+pub use set::{
+    ChunkFormat, Fault, Piece, Progress, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge,
+};
 pub use spd::{MOST_FILES, SpdFolder, files as spd_files};
 
 /// File format of a data set.
@@ -96,12 +99,34 @@ pub enum OutputError {
     Unfinished { path: PathBuf, root: PathBuf },
     #[error("{path:?} holds another data set: {difference}")]
     Different { path: PathBuf, difference: String },
-    #[error("{path:?} is damaged: {fault}; make it again, replacing it")]
+    #[error("{path:?} is damaged: {fault}; repair it, or make it again, replacing it")]
     Damaged { path: PathBuf, fault: String },
+    #[error("{path:?} is not what was written: {faults}; make what is damaged again, resuming the set")]
+    DamagedParts { path: PathBuf, faults: String },
+    #[error("{root:?} is being written by {holder}: wait until that ends, or end it")]
+    Busy { root: PathBuf, holder: String },
+    #[error(
+        "{root:?} holds a data set, and its file system has no locks that would tell whether another process still \
+         writes it: delete it if none does"
+    )]
+    NoLocks { root: PathBuf },
+    #[error("{root:?} was begun again by another process: what this one made is gone")]
+    Replaced { root: PathBuf },
+    #[error(
+        "part {} of {} was finished before, and {root:?} is not complete, with {done} of {chunks} chunks: {missing}, \
+         which nobody makes now",
+        .shard.index,
+        .shard.count
+    )]
+    NothingMade { root: PathBuf, shard: Shard, done: u64, chunks: u64, missing: String },
     #[error("{}", not_a_set(path))]
     NotASet { path: PathBuf },
     #[error("cannot use the manifest {path:?}: {reason}")]
     Manifest { path: PathBuf, reason: String },
+    #[error("{path:?} is the manifest of another version of this program: {remedy}")]
+    ManifestVersion { path: PathBuf, remedy: &'static str },
+    #[error("cannot repair {path:?}: {reason}")]
+    Unrepaired { path: PathBuf, reason: String },
     #[error("{path:?} is not complete: {done} of {chunks} chunks are done")]
     Incomplete { path: PathBuf, done: u64, chunks: u64 },
 }

@@ -7,11 +7,16 @@ use std::path::{Path, PathBuf};
 use tempfile::{NamedTempFile, TempDir};
 
 use super::OutputError;
+use super::lock;
 
-/// Prefix of the names of temporary files.
-pub(super) const PREFIX: &str = ".spectroll-";
+/// End of the names of temporary files, which are `NAME.XXXXXX.partial`: for people to see and to understand.
+const SUFFIX: &str = ".partial";
 
-pub(super) const SUFFIX: &str = ".partial";
+/// Number of random characters in them.
+const RANDOM: usize = 6;
+
+/// Longest part of a name that the temporary one repeats, so that there is one for every name that there can be.
+const REPEATED: usize = 200;
 
 /// Treatment of a file or folder that exists already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +28,7 @@ pub enum IfExists {
 }
 
 /// A file on its way to its name: a temporary one beside it until [`PendingFile::finish`], and deleted if that is
-/// never called.
+/// never called. Those that killed runs left are deleted when the next file of their name is begun.
 #[derive(Debug)]
 pub struct PendingFile {
     file: NamedTempFile,
@@ -34,12 +39,11 @@ pub struct PendingFile {
 impl PendingFile {
     /// Begins a file that will appear as `path`.
     pub fn create(path: impl AsRef<Path>, existing: IfExists) -> Result<PendingFile, OutputError> {
-        let path = path.as_ref();
-        let path = path.to_owned();
+        let path = target(path.as_ref(), existing);
         if path.is_dir() {
             return Err(OutputError::Folder { path });
         }
-        // The temporary name may be short enough where this one is not.
+        // The temporary name is short enough where this one is not.
         if let Err(source) = path.symlink_metadata()
             && source.kind() == io::ErrorKind::InvalidFilename
         {
@@ -51,7 +55,9 @@ impl PendingFile {
         if existing == IfExists::Refuse && path.symlink_metadata().is_ok() {
             return Err(OutputError::Exists { path });
         }
-        match temporary(existing_folder(&path)?, PREFIX) {
+        existing_folder(&path)?;
+        let _ = sweep_of(&path); // what cannot be deleted is in nobody's way
+        match held(&path) {
             Ok(file) => Ok(PendingFile { file, path, existing }),
             Err(source) => Err(OutputError::Write { path, source }),
         }
@@ -109,10 +115,11 @@ pub struct FolderMark {
 impl PendingFolder {
     /// Begins a folder that will appear as `path`. One that exists is replaced only if it has the mark.
     pub fn create(path: &Path, existing: IfExists, ours: FolderMark) -> Result<PendingFolder, OutputError> {
-        let path = path.to_owned();
+        let path = target(path, existing);
         check_folder(&path, existing, ours)?;
+        let prefix = prefix(&path);
         let mut builder = tempfile::Builder::new();
-        builder.prefix(PREFIX).suffix(SUFFIX);
+        builder.prefix(&prefix).suffix(SUFFIX).rand_bytes(RANDOM);
         #[cfg(unix)] // as any new folder; by default only its owner could read it
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
         match builder.tempdir_in(existing_folder(&path)?) {
@@ -142,7 +149,7 @@ impl PendingFolder {
         sync_folder(self.making.path());
         let parent = folder(&self.path);
         let old = if self.path.exists() {
-            let old = tempfile::Builder::new().prefix(PREFIX).suffix(SUFFIX).tempdir_in(parent);
+            let old = tempfile::Builder::new().prefix(&prefix(&self.path)).suffix(SUFFIX).tempdir_in(parent);
             let old = old.map_err(|e| self.failed(e))?;
             fs::rename(&self.path, old.path().join("old")).map_err(|e| self.failed(e))?;
             Some(old)
@@ -188,34 +195,85 @@ pub fn write_file(path: impl AsRef<Path>, existing: IfExists, bytes: &[u8]) -> R
 /// Puts a whole file in place, by way of a temporary one beside it: complete whenever it is there, and on disk once
 /// [`sync_folder`] was called as well.
 pub(super) fn place(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    place_by(folder(path), PREFIX, path, bytes)
-}
-
-/// Puts a whole file in place by way of a temporary file in the folder `by`, whose name begins with `prefix`.
-pub(super) fn place_by(by: &Path, prefix: &str, path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = temporary(by, prefix)?;
+    let mut file = temporary(path)?;
     file.write_all(bytes)?;
     file.as_file().sync_data()?;
     file.persist(path).map_err(|e| e.error)?;
     Ok(())
 }
 
-/// Creates a temporary file.
-fn temporary(folder: &Path, prefix: &str) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(prefix).suffix(SUFFIX);
-    #[cfg(unix)] // as any new file; by default only its owner could read it
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
+/// Path that is written where `path` is a symbolic link that may be replaced: that of its target.
+fn target(path: &Path, existing: IfExists) -> PathBuf {
+    match existing {
+        IfExists::Replace if path.is_symlink() => fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()),
+        _ => path.to_owned(),
+    }
 }
 
-/// Removes the temporary files that killed runs left in a folder, as far as their names begin with `prefix`.
-pub(super) fn sweep(folder: &Path, prefix: &str) -> io::Result<()> {
+/// Start of the temporary names of what will be `path`.
+fn prefix(path: &Path) -> std::ffi::OsString {
+    let name = path.file_name().unwrap_or_default();
+    if name.len() <= REPEATED {
+        let mut prefix = name.to_owned();
+        prefix.push(".");
+        return prefix;
+    }
+    let name = name.to_string_lossy();
+    let end = (0..=REPEATED).rev().find(|&end| name.is_char_boundary(end)).unwrap_or(0);
+    format!("{}.", &name[..end]).into()
+}
+
+/// Creates a temporary file of what will be `path`.
+fn temporary(path: &Path) -> io::Result<NamedTempFile> {
+    let prefix = prefix(path);
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(SUFFIX).rand_bytes(RANDOM);
+    #[cfg(unix)] // as any new file; by default only its owner could read it
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder(path))
+}
+
+/// Creates a temporary file that is locked, so that nobody sweeps it.
+fn held(path: &Path) -> io::Result<NamedTempFile> {
+    loop {
+        let file = temporary(path)?;
+        if lock::hold(file.as_file(), file.path()) {
+            return Ok(file);
+        }
+    }
+}
+
+/// Removes the temporary files of a name that no living process holds.
+fn sweep_of(path: &Path) -> io::Result<()> {
+    let prefix = prefix(path);
+    for entry in fs::read_dir(folder(path))? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let is_ours = name
+            .as_encoded_bytes()
+            .strip_prefix(prefix.as_encoded_bytes())
+            .and_then(|rest| rest.strip_suffix(SUFFIX.as_bytes()))
+            .is_some_and(is_random);
+        if is_ours && lock::is_left(&entry.path()) {
+            fs::remove_file(entry.path()).or_else(ignore_missing)?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether this may be the random part of a temporary name.
+fn is_random(part: &[u8]) -> bool {
+    part.len() == RANDOM && part.iter().all(u8::is_ascii_alphanumeric)
+}
+
+/// Removes the temporary files in a folder that no other process writes to.
+pub(super) fn sweep(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with(prefix) && name.ends_with(SUFFIX) {
+        let stem = name.as_encoded_bytes().strip_suffix(SUFFIX.as_bytes());
+        let random = stem.and_then(|stem| stem.rsplit(|&byte| byte == b'.').next());
+        if random.is_some_and(is_random) {
             // Another process may have been faster.
             fs::remove_file(entry.path()).or_else(ignore_missing)?;
         }
@@ -332,9 +390,40 @@ mod tests {
     #[test]
     fn what_killed_runs_leave_is_swept() {
         let folder = tempfile::tempdir().unwrap();
-        let left = temporary(folder.path(), PREFIX).unwrap().keep().unwrap().1;
-        fs::write(folder.path().join("mine.partial"), "mine").unwrap();
-        sweep(folder.path(), PREFIX).unwrap();
-        assert!(!left.exists() && folder.path().join("mine.partial").exists());
+        let path = folder.path().join("x.npy");
+        let left = temporary(&path).unwrap().keep().unwrap().1;
+        assert!(left.file_name().unwrap().to_str().unwrap().starts_with("x.npy."));
+        for mine in ["x.npy.partial", "x.npy.mine.partial", "y.npy.Ab12Cd.partial"] {
+            fs::write(folder.path().join(mine), "mine").unwrap();
+        }
+        let living = PendingFile::create(&path, IfExists::Refuse).unwrap();
+        drop(PendingFile::create(&path, IfExists::Refuse).unwrap());
+        assert!(!cfg!(unix) || !left.exists());
+        assert!(living.temporary_path().exists());
+        drop(living);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+        let left = temporary(&path).unwrap().keep().unwrap().1;
+        sweep(folder.path()).unwrap();
+        assert!(!left.exists() && folder.path().join("x.npy.partial").exists());
+    }
+
+    #[test]
+    fn the_longest_names_have_temporary_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("{}.npy", "ö".repeat(125)));
+        write_file(&path, IfExists::Refuse, b"whole").unwrap();
+        assert_eq!(fs::read(path).unwrap(), b"whole");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_target_of_a_link_is_replaced_and_not_the_link() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link] = ["file.csv", "link.csv"].map(|name| folder.path().join(name));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink("file.csv", &link).unwrap();
+        assert!(matches!(write_file(&link, IfExists::Refuse, b"new"), Err(OutputError::Exists { .. })));
+        write_file(&link, IfExists::Replace, b"new").unwrap();
+        assert!(link.is_symlink() && fs::read(&file).unwrap() == b"new");
     }
 }

@@ -222,7 +222,7 @@ impl Hue {
 
 /// The key of a target that an error of its recipe is about, and the error.
 fn because_of(aim: &TargetConstraint, error: RecipeError) -> (&'static str, SceneErrorKind) {
-    let is_hopeless = matches!(error, RecipeError::Hopeless { .. });
+    let is_hopeless = matches!(error, RecipeError::Hopeless { .. } | RecipeError::Empty { .. });
     match aim {
         TargetConstraint::Lrv(LrvLevels::Uniform(from, to)) if is_hopeless => {
             ("lrv", SceneErrorKind::HopelessRange { from: *from, to: *to, source: error })

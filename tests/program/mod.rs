@@ -55,6 +55,14 @@ pub(crate) fn tree(folder: &Path) -> Vec<(String, Vec<u8>)> {
     all
 }
 
+/// The text of a manifest, with the sum that it has to end with.
+pub(crate) fn signed(text: &str) -> String {
+    let end = "\"\n}\n";
+    let (start, _) = text.rsplit_once("\"blake3\": \"").unwrap();
+    let start = format!("{start}\"blake3\": \"");
+    format!("{start}{}{end}", blake3::hash(format!("{start}{end}").as_bytes()).to_hex())
+}
+
 /// Shape and values of an array of 32-bit floats in C order.
 pub(crate) fn npy(path: &Path) -> (Vec<u64>, Vec<f32>) {
     let bytes = fs::read(path).unwrap();

@@ -35,8 +35,8 @@ pub(in crate::cli) struct OutputArguments {
           allow_negative_numbers = true)]
     zstd: Option<u32>,
     /// Make only the I-th of N parts of a .zarr or FOLDER/; auto takes them from Slurm's or Kubernetes' variables, which
-    /// a --dry-run does without
-    #[arg(long, value_name = "I/N|auto|auto/N", allow_hyphen_values = true)]
+    /// a --dry-run does without, and auto/1-8 of jobs first submitted with --array=1-8
+    #[arg(long, value_name = "I/N|auto|auto/N|auto/FIRST-LAST", allow_hyphen_values = true)]
     shard: Option<ShardName>,
     /// Go on with a .zarr or FOLDER/ that an earlier run began, if one did
     #[arg(long)]

@@ -1,11 +1,11 @@
-//! Manifest of a set: its plan, on which all its bytes depend, and the sums of the chunks that are done.
+//! Manifest of a set: its plan, on which all its bytes depend, and the sums of the files that are done.
 //!
 //! While a set is being written each process keeps a manifest of its own, so that any number of them can work on one
-//! set without a coordinator. Sealing joins them into one.
+//! set without a coordinator. Sealing joins them into one. A manifest ends with its own sum.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -14,13 +14,20 @@ use serde_json::Value;
 
 use super::super::pending::ignore_missing;
 use super::super::{OutputError, Schema, partial};
+use super::check::check;
 use super::{ChunkFormat, Part, SetMode, Shard};
 
 /// Name of the manifest of a whole set.
 pub(super) const SEALED: &str = "_manifest.json";
 
 /// Version of the manifest that this program writes and reads.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
+
+/// Largest manifest that is read, in bytes.
+const LARGEST: u64 = 1 << 30;
+
+/// Bytes of a file that are summed at once.
+const BUFFER: usize = 1 << 20;
 
 /// Plan of a set: everything that its bytes depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,8 +49,8 @@ impl SetPlan {
 
     /// Range of draws in a chunk, counted from the set's first.
     pub fn draws(&self, chunk: u64) -> Range<u64> {
-        let first = chunk * self.chunk;
-        first..self.schema.count.min(first + self.chunk)
+        let bound = |chunk: u64| chunk.saturating_mul(self.chunk).min(self.schema.count);
+        bound(chunk)..bound(chunk.saturating_add(1))
     }
 
     /// Number of chunks of a shard that no earlier run has made, as far as the manifests of a set at `path` tell.
@@ -83,7 +90,7 @@ fn difference(place: &str, here: &Value, there: &Value) -> Option<String> {
     }
 }
 
-/// Sum of a file of a chunk, as it was written.
+/// Sum of a file, as it was written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Sum {
     pub(super) name: String,
@@ -93,46 +100,105 @@ pub(super) struct Sum {
 
 impl Sum {
     pub(super) fn of(part: &Part) -> Sum {
-        let blake3 = blake3::hash(&part.bytes).to_hex().to_string();
-        Sum { name: part.name.clone(), bytes: part.bytes.len() as u64, blake3 }
+        Sum::new(&part.name, &part.bytes)
+    }
+
+    pub(super) fn new(name: &str, bytes: &[u8]) -> Sum {
+        let blake3 = blake3::hash(bytes).to_hex().to_string();
+        Sum { name: name.to_owned(), bytes: bytes.len() as u64, blake3 }
     }
 
     /// Describes how the file in a set differs from what was written, if it does.
     pub(super) fn fault(&self, root: &Path) -> Option<String> {
-        let bytes = match fs::read(root.join(&self.name)) {
-            Ok(bytes) => bytes,
-            Err(e) if e.kind() == io::ErrorKind::NotFound => {
-                return Some(format!("{} is missing", self.name));
-            }
-            Err(e) => return Some(format!("{} cannot be read: {e}", self.name)),
-        };
-        if bytes.len() as u64 != self.bytes {
-            return Some(format!("{} has {} bytes instead of {}", self.name, bytes.len(), self.bytes));
+        if let Some(fault) = self.size_fault(root) {
+            return Some(fault);
         }
-        (blake3::hash(&bytes).to_hex().as_str() != self.blake3)
-            .then(|| format!("{} does not match its BLAKE3 sum", self.name))
+        match self.hash(&root.join(&self.name)) {
+            Ok(sum) if sum == self.blake3 => None,
+            Ok(_) => Some(format!("{} does not match its BLAKE3 sum", self.name)),
+            Err(e) => Some(format!("{} cannot be read: {e}", self.name)),
+        }
+    }
+
+    /// Describes how the file's size differs from what was written, or whether it is missing. Reads no file, and so
+    /// waits for none.
+    pub(super) fn size_fault(&self, root: &Path) -> Option<String> {
+        match fs::metadata(root.join(&self.name)) {
+            Ok(found) if !found.is_file() => Some(format!("{} is not a plain file", self.name)),
+            Ok(found) if found.len() != self.bytes => {
+                Some(format!("{} has {} bytes instead of {}", self.name, found.len(), self.bytes))
+            }
+            Ok(_) => None,
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Some(format!("{} is missing", self.name)),
+            Err(e) => Some(format!("{} cannot be read: {e}", self.name)),
+        }
+    }
+
+    /// Sum of the file as it is, of no more than its bytes.
+    fn hash(&self, path: &Path) -> io::Result<String> {
+        let mut file = File::open(path)?.take(self.bytes);
+        let (mut hasher, mut buffer) = (blake3::Hasher::new(), vec![0; BUFFER.min(self.bytes as usize + 1)]);
+        loop {
+            match file.read(&mut buffer) {
+                Ok(0) => return Ok(hasher.finalize().to_hex().to_string()),
+                Ok(read) => _ = hasher.update(&buffer[..read]),
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(e),
+            }
+        }
     }
 }
 
 /// Manifest of a set, or of the part of it that one process has done.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Manifest {
     /// Version of the manifest.
     manifest: u32,
+    /// Mark of the set that is being written, new whenever it is begun again. A whole set has none: it would tell
+    /// sets of equal bytes apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) generation: Option<String>,
     pub(super) plan: SetPlan,
     /// Engines that drew the chunks.
     pub(super) engines: BTreeSet<String>,
+    /// Files that are no chunks: arrays that all draws share, the model or the scene, and once the set is complete
+    /// what describes it to readers.
+    pub(super) files: Vec<Sum>,
     /// Files of each chunk that is done.
     pub(super) chunks: BTreeMap<u64, Vec<Sum>>,
+    /// Sum of the text of the manifest in which this is empty.
+    blake3: String,
 }
 
 impl Manifest {
-    pub(super) fn new(plan: SetPlan) -> Manifest {
-        Manifest { manifest: VERSION, plan, engines: BTreeSet::new(), chunks: BTreeMap::new() }
+    pub(super) fn new(plan: SetPlan, generation: &str) -> Manifest {
+        Manifest {
+            manifest: VERSION,
+            generation: Some(generation.to_owned()),
+            plan,
+            engines: BTreeSet::new(),
+            files: Vec::new(),
+            chunks: BTreeMap::new(),
+            blake3: String::new(),
+        }
     }
 
     pub(super) fn is_complete(&self) -> bool {
         self.chunks.len() as u64 == self.plan.chunks()
+    }
+
+    /// Sums of all files.
+    pub(super) fn sums(&self) -> impl Iterator<Item = &Sum> {
+        self.files.iter().chain(self.chunks.values().flatten())
+    }
+
+    /// Notes a file that is no chunk.
+    pub(super) fn note(&mut self, sum: Sum) {
+        match self.files.iter_mut().find(|file| file.name == sum.name) {
+            Some(file) => *file = sum,
+            None => self.files.push(sum),
+        }
     }
 
     /// Returns an error where a plan is not that of this manifest, which lies in the folder `root`.
@@ -145,7 +211,11 @@ impl Manifest {
 
     /// Text of the manifest's file.
     pub(super) fn text(&self) -> String {
-        serde_json::to_string_pretty(self).expect("manifests are JSON") + "\n"
+        let unsigned = Manifest { blake3: String::new(), ..self.clone() };
+        let text = serde_json::to_string_pretty(&unsigned).expect("manifests are JSON") + "\n";
+        let sum = blake3::hash(text.as_bytes()).to_hex();
+        let start = text.strip_suffix(END).expect("the sum is the last entry");
+        format!("{start}{sum}{END}")
     }
 
     /// Reads the manifest of a whole set.
@@ -163,8 +233,16 @@ impl Manifest {
                 None => joined = Some(part),
                 Some(joined) => {
                     joined.check(&part.plan, root)?;
+                    match (&joined.generation, &part.generation) {
+                        (Some(here), Some(there)) if here != there => {
+                            return Err(OutputError::Replaced { root: root.to_owned() });
+                        }
+                        (None, _) => joined.generation = part.generation,
+                        _ => {}
+                    }
                     joined.engines.extend(part.engines);
                     joined.chunks.extend(part.chunks);
+                    part.files.into_iter().for_each(|sum| joined.note(sum));
                 }
             }
         }
@@ -172,9 +250,12 @@ impl Manifest {
     }
 }
 
-/// Name of the manifest of one of several processes, both counted from 1.
-pub(super) fn part_name(index: u64, count: u64) -> String {
-    format!("_manifest.{index}-of-{count}.json")
+/// End of a manifest's text, after the sum.
+const END: &str = "\"\n}\n";
+
+/// Name of the manifest of one of several processes.
+pub(super) fn part_name(shard: Shard) -> String {
+    format!("_manifest.{}-of-{}.json", shard.index, shard.count)
 }
 
 /// Lists the manifests in a folder, of processes and of the whole.
@@ -183,7 +264,9 @@ pub(super) fn manifests(root: &Path) -> io::Result<Vec<std::path::PathBuf>> {
     for entry in fs::read_dir(root)? {
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        if name == SEALED || (name.starts_with("_manifest.") && name.contains("-of-")) {
+        if name == SEALED
+            || (name.starts_with("_manifest.") && name.contains("-of-") && name.ends_with(".json"))
+        {
             found.push(entry.path());
         }
     }
@@ -197,19 +280,48 @@ pub(super) fn remove_parts(root: &Path) -> io::Result<()> {
     parts.into_iter().try_for_each(|path| fs::remove_file(path).or_else(ignore_missing))
 }
 
+/// Entry of a manifest of any version.
+#[derive(Deserialize)]
+struct Head {
+    manifest: u32,
+}
+
 /// Reads a manifest, if it exists.
 fn read(path: &Path) -> Result<Option<Manifest>, OutputError> {
     let failed = |reason: String| OutputError::Manifest { path: path.to_owned(), reason };
-    let text = match fs::read_to_string(path) {
+    let text = match regular(path) {
         Ok(text) => text,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(failed(e.to_string())),
     };
-    let manifest: Manifest = serde_json::from_str(&text).map_err(|e| failed(e.to_string()))?;
-    if manifest.manifest > VERSION {
-        return Err(failed(format!("it is of version {}: update spectroll", manifest.manifest)));
+    let head: Head = serde_json::from_str(&text).map_err(|e| failed(e.to_string()))?;
+    let remedy = if head.manifest > VERSION { "update spectroll" } else { "make the set again" };
+    if head.manifest != VERSION {
+        return Err(OutputError::ManifestVersion { path: path.to_owned(), remedy });
     }
+    let manifest: Manifest = serde_json::from_str(&text).map_err(|e| failed(e.to_string()))?;
+    let signed = format!("{}{END}", manifest.blake3);
+    let unsigned = text.strip_suffix(&signed).map(|start| format!("{start}{END}"));
+    let sum = unsigned.map(|unsigned| blake3::hash(unsigned.as_bytes()).to_hex().to_string());
+    if sum.as_ref() != Some(&manifest.blake3) {
+        return Err(failed("it does not match its BLAKE3 sum".to_owned()));
+    }
+    check(&manifest).map_err(failed)?;
     Ok(Some(manifest))
+}
+
+/// Text of a plain file of no more than [`LARGEST`] bytes.
+fn regular(path: &Path) -> io::Result<String> {
+    let found = fs::metadata(path)?;
+    if !found.is_file() {
+        return Err(io::Error::other("it is not a plain file"));
+    }
+    if found.len() > LARGEST {
+        return Err(io::Error::other(format!("it has {} bytes, and no manifest has", found.len())));
+    }
+    let mut text = String::new();
+    File::open(path)?.take(LARGEST).read_to_string(&mut text)?;
+    Ok(text)
 }
 
 #[cfg(test)]

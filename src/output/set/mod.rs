@@ -3,16 +3,18 @@
 //! A set is written in a folder beside its name, `NAME.partial`, and renamed when every chunk is there. A run that is
 //! killed leaves the chunks that it finished, and the next goes on from them. Processes that share a set divide its
 //! chunks; whichever finds all of them done seals it. Since a chunk depends on the plan alone, nothing of this shows
-//! in the bytes.
+//! in the bytes. Locks keep two processes from the same chunks, and a set from being replaced while it is written.
 
 mod audit;
+mod check;
+mod layout;
 mod manifest;
+mod occupy;
 mod parts;
 mod pool;
 mod seal;
 mod zarr;
 
-use std::borrow::Cow;
 use std::fs;
 use std::io;
 use std::ops::Range;
@@ -21,90 +23,23 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::OutputError;
+use super::lock::LockFile;
 use super::pending::{existing_folder, place};
-pub use audit::SetAudit;
+pub use audit::{Fault, Piece, SetAudit};
+pub use layout::ChunkFormat;
+use layout::Part;
 pub use manifest::SetPlan;
-use manifest::{Manifest, part_name};
+use manifest::{Manifest, Sum, part_name};
+use occupy::{Begun, generation, occupy};
 use pool::{Chunk, Pool};
+use seal::Depth;
 pub use seal::{SetStatus, merge};
-
-/// Approximate default size of a chunk in bytes: large enough for a disk, small enough to hold several.
-const CHUNK_BYTES: u64 = 16 << 20;
 
 /// Shortest time between saves of the manifest: a killed run repeats no more than this. Saves take at most a
 /// twentieth of the time.
 const CHECKPOINT: Duration = Duration::from_millis(100);
-
-/// Format of a set's chunks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ChunkFormat {
-    /// A Zarr store, version 3, compressed by Zstandard where a level is given.
-    Zarr {
-        /// Zstandard level.
-        zstd: Option<i32>,
-    },
-    /// A folder of `.npy` files.
-    Npy,
-    /// A folder of `.parquet` files.
-    Parquet,
-}
-
-/// A file of a set.
-pub(super) struct Part<'a> {
-    /// Path in the set's folder.
-    pub(super) name: String,
-    pub(super) bytes: Cow<'a, [u8]>,
-}
-
-impl ChunkFormat {
-    /// Default number of draws per chunk, for rows of `row_bytes` and `count` draws in all: a power of two, or all.
-    pub fn default_chunk(row_bytes: u64, count: u64) -> u64 {
-        (1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2()).min(count.max(1))
-    }
-
-    /// Encodes the files of a chunk.
-    fn encode<'a>(self, plan: &SetPlan, index: u64, columns: &'a [Vec<u8>]) -> io::Result<Vec<Part<'a>>> {
-        match self {
-            ChunkFormat::Zarr { zstd } => zarr::chunk(&plan.schema, zstd, plan.chunk, index, columns),
-            ChunkFormat::Npy => parts::npy(&plan.schema, index, columns),
-            ChunkFormat::Parquet => parts::parquet(&plan.schema, index, columns),
-        }
-    }
-
-    /// Encodes the files that describe the chunks to readers.
-    fn metadata(self, plan: &SetPlan) -> io::Result<Vec<Part<'static>>> {
-        match self {
-            ChunkFormat::Zarr { zstd } => Ok(zarr::metadata(&plan.schema, zstd, plan.chunk)),
-            ChunkFormat::Npy => parts::npy_metadata(&plan.schema),
-            ChunkFormat::Parquet => Ok(Vec::new()),
-        }
-    }
-
-    /// Encodes the files of the arrays that all draws share.
-    fn constants(self, plan: &SetPlan) -> io::Result<Vec<Part<'_>>> {
-        match self {
-            ChunkFormat::Zarr { .. } => Ok(zarr::constants(&plan.schema)),
-            ChunkFormat::Npy => parts::npy_constants(&plan.schema),
-            ChunkFormat::Parquet => Ok(Vec::new()), // see Layout::check
-        }
-    }
-
-    /// Folders within a set.
-    fn folders(self, plan: &SetPlan) -> Vec<String> {
-        match self {
-            ChunkFormat::Zarr { .. } => {
-                let names = plan.schema.fields.iter().map(|field| field.name.clone());
-                let constants = plan.schema.shared.iter().map(|constant| constant.name.clone());
-                names.chain(constants).chain(["wavelength".to_owned()]).collect()
-            }
-            ChunkFormat::Npy | ChunkFormat::Parquet => Vec::new(),
-        }
-    }
-}
 
 /// Part of a set's chunks that one of several processes writes: the `index`-th of `count`, from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -166,6 +101,10 @@ pub struct SetWriter {
     checkpoint: Instant,
     /// Number of chunks that the saved manifest lacks.
     unsaved: usize,
+    /// Number of chunks that this process has to make.
+    to_make: usize,
+    /// Mark of the set, and the locks that this process holds; `None` of a complete set.
+    held: Option<(String, [LockFile; 2])>,
 }
 
 impl SetWriter {
@@ -178,21 +117,31 @@ impl SetWriter {
         (shard, start): (Shard, SetMode),
         engine: &str,
     ) -> Result<SetWriter, OutputError> {
-        let path = PathBuf::from_iter(path.components()); // without a slash at its end
+        let mut path = PathBuf::from_iter(path.components()); // without a slash at its end
+        if path.is_symlink() {
+            path = fs::canonicalize(&path).unwrap_or(path); // the target is replaced, and not the link
+        }
         existing_folder(&path)?;
-        let root = seal::occupy(&path, &plan, shard, start)?;
-        let failed = |source| OutputError::Write { path: path.clone(), source };
-        let mut manifest = Manifest::new(plan.clone());
+        let begun = occupy(&path, &plan, shard, start)?;
+        let (root, held) = match begun {
+            Some(Begun { root, generation, locks }) => (root, Some((generation, locks))),
+            None => (path.clone(), None),
+        };
+        let mut manifest =
+            Manifest::new(plan.clone(), held.as_ref().map_or("", |(generation, _)| generation.as_str()));
+        let own = shard.of(plan.chunks());
         if let Some(found) = Manifest::joined(&root)? {
             found.check(&plan, &root)?;
             manifest.engines = found.engines;
-            let own = shard.of(plan.chunks());
             let found: Vec<_> = found.chunks.into_iter().filter(|(index, _)| own.contains(index)).collect();
-            let sound =
-                |(_, sums): &(u64, Vec<manifest::Sum>)| sums.iter().all(|sum| sum.fault(&root).is_none());
-            manifest.chunks = found.into_par_iter().filter(sound).collect();
+            // Those of a complete set were checked as it was opened.
+            let is_sound = |(_, sums): &(u64, Vec<Sum>)| {
+                held.is_none() || sums.iter().all(|sum| sum.fault(&root).is_none())
+            };
+            manifest.chunks = found.into_par_iter().filter(is_sound).collect();
         }
-        let missing = shard.of(plan.chunks()).filter(|index| !manifest.chunks.contains_key(index)).collect();
+        let missing: std::collections::VecDeque<u64> =
+            own.filter(|index| !manifest.chunks.contains_key(index)).collect();
         let plan = Arc::new(plan);
         let mut writer = SetWriter {
             filling: vec![Vec::new(); plan.schema.fields.len()],
@@ -201,31 +150,48 @@ impl SetWriter {
             shard,
             start,
             manifest,
+            to_make: missing.len(),
             missing,
             spare: Vec::new(),
             checkpoint: Instant::now(),
             unsaved: 0,
             root,
-            path: path.clone(),
+            path,
+            held,
         };
         if !writer.missing.is_empty() {
             writer.manifest.engines.insert(engine.to_owned());
         }
-        if writer.root != writer.path {
-            seal::claim(&writer.path, &writer.root, shard, start)?;
-            for folder in writer.plan.layout.folders(&writer.plan) {
-                fs::create_dir_all(writer.root.join(folder)).map_err(failed)?;
-            }
-            let constants = writer.plan.layout.constants(&writer.plan).map_err(failed)?;
-            for part in constants {
-                place(&writer.root.join(part.name), &part.bytes).map_err(failed)?;
-            }
-            for (name, text) in companions {
-                place(&writer.root.join(name), text.as_bytes()).map_err(failed)?;
-            }
-            writer.save()?;
+        if writer.held.is_some() {
+            writer.begin(companions)?;
         }
         Ok(writer)
+    }
+
+    /// Writes what all processes of a set write, and the first manifest of this one.
+    fn begin(&mut self, companions: &[(&str, &str)]) -> Result<(), OutputError> {
+        let plan = self.plan.clone();
+        for folder in plan.layout.folders(&plan) {
+            match fs::create_dir(self.root.join(folder)) {
+                Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(self.failed(e)),
+                _ => {}
+            }
+        }
+        let constants = plan.layout.constants(&plan).map_err(|e| self.failed(e))?;
+        let companions = companions
+            .iter()
+            .map(|(name, text)| Part { name: (*name).to_owned(), bytes: text.as_bytes().into() });
+        for part in constants.into_iter().chain(companions) {
+            place(&self.root.join(&part.name), &part.bytes).map_err(|e| self.failed(e))?;
+            self.manifest.note(Sum::of(&part));
+        }
+        self.save()?;
+        // Of two processes that begin one set at once with two plans, the second to get here is wrong.
+        if let Err(error) = Manifest::joined(&self.root) {
+            let _ = fs::remove_file(self.root.join(part_name(self.shard)));
+            return Err(error);
+        }
+        Ok(())
     }
 
     /// Ranges of the draws that are to be written, in order, counted from the set's first.
@@ -293,34 +259,53 @@ impl SetWriter {
 
     /// Saves this process's manifest.
     fn save(&mut self) -> Result<(), OutputError> {
-        let name = part_name(self.shard.index, self.shard.count);
+        let Some((own, [set, _])) = &self.held else { return Ok(()) };
+        if generation(set).as_ref() != Some(own) {
+            return Err(OutputError::Replaced { root: self.root.clone() }); // where there are no locks
+        }
         let start = Instant::now();
-        place(&self.root.join(name), self.manifest.text().as_bytes())
+        place(&self.root.join(part_name(self.shard)), self.manifest.text().as_bytes())
             .map_err(|source| self.failed(source))?;
         self.checkpoint = Instant::now() + CHECKPOINT.max(20 * start.elapsed());
         self.unsaved = 0;
         Ok(())
     }
 
-    /// Waits for the last chunks, and seals the set where all of it is there.
+    /// Waits for the last chunks, and seals the set where all of it is there. An error where this process had nothing to
+    /// make, and nobody makes what is missing.
     pub fn finish(mut self) -> Result<SetStatus, OutputError> {
         assert!(self.missing.is_empty(), "all that was missing was written");
-        if self.root == self.path {
-            return Ok(SetStatus::Sealed); // it was before
-        }
         self.pool.close();
         self.collect()?;
         self.save()?;
-        seal::seal(&self.path, self.start == SetMode::Replace)
+        let Some((own, locks)) = self.held.take() else {
+            return Ok(SetStatus::Sealed); // it was before
+        };
+        drop(locks);
+        let status = seal::seal(&self.path, self.start == SetMode::Replace, Depth::Sizes, Some(&own))?;
+        let had_part = !self.shard.of(self.plan.chunks()).is_empty();
+        match status {
+            SetStatus::Waiting { done, chunks } if self.to_make == 0 && had_part && done < chunks => {
+                match seal::abandoned(&self.path, self.shard.count) {
+                    Some(missing) => Err(OutputError::NothingMade {
+                        root: self.root.clone(),
+                        shard: self.shard,
+                        done,
+                        chunks,
+                        missing,
+                    }),
+                    None => Ok(status),
+                }
+            }
+            status => Ok(status),
+        }
     }
 
     /// Keeps what is finished, and leaves the rest to another run.
     pub fn stop(mut self) -> Result<Progress, OutputError> {
         self.pool.stop();
         let _ = self.collect(); // its error is the reason to stop, if there is one
-        if self.root != self.path {
-            self.save()?;
-        }
+        self.save()?;
         Ok(self.progress())
     }
 
@@ -345,13 +330,5 @@ mod tests {
             }
             assert_eq!(end, chunks);
         }
-    }
-
-    #[test]
-    fn a_chunk_is_a_power_of_two_of_draws_or_all() {
-        assert_eq!(ChunkFormat::default_chunk(124, 1 << 40), 1 << 17);
-        assert_eq!(ChunkFormat::default_chunk(1 << 40, 10), 1);
-        assert_eq!(ChunkFormat::default_chunk(124, 10), 10);
-        assert_eq!(ChunkFormat::default_chunk(124, 0), 1);
     }
 }

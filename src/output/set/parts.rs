@@ -3,8 +3,18 @@
 use std::io;
 
 use super::super::npy;
-use super::super::schema::{Schema, SharedArray};
+use super::super::schema::{Field, Schema, SharedArray};
 use super::Part;
+
+/// Name of the `.npy` file of a field in a chunk.
+pub(super) fn npy_name(field: &Field, index: u64) -> String {
+    format!("{}-{index:06}.npy", field.name)
+}
+
+/// Name of the `.parquet` file of a chunk.
+pub(super) fn parquet_name(index: u64) -> String {
+    format!("part-{index:06}.parquet")
+}
 
 /// Encodes the `.npy` files of one chunk.
 pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Result<Vec<Part<'static>>> {
@@ -15,7 +25,7 @@ pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Resul
         .map(|(field, column)| {
             let shape = field.shape((column.len() / field.delivered_bytes()) as u64);
             let bytes = npy::file(npy::type_string(field.stored), &shape, &field.store(column)?);
-            Ok(Part { name: format!("{}-{index:06}.npy", field.name), bytes: bytes.into() })
+            Ok(Part { name: npy_name(field, index), bytes: bytes.into() })
         })
         .collect()
 }
@@ -45,10 +55,10 @@ pub(super) fn parquet(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::R
     let mut encoder = Box::new(super::super::parquet::Parquet::begin(&mut bytes, schema)?);
     encoder.write(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>())?;
     encoder.finish()?;
-    Ok(vec![Part { name: format!("part-{index:06}.parquet"), bytes: bytes.into() }])
+    Ok(vec![Part { name: parquet_name(index), bytes: bytes.into() }])
 }
 
 #[cfg(not(feature = "parquet"))]
 pub(super) fn parquet(_: &Schema, _: u64, _: &[Vec<u8>]) -> io::Result<Vec<Part<'static>>> {
-    unreachable!("Layout::check refuses what was not compiled in")
+    Err(io::Error::other("this build leaves out Parquet: build it with the feature parquet"))
 }

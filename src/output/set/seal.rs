@@ -1,13 +1,22 @@
-//! Folder of a set: its creation, and its renaming once complete.
+//! Completion of a set: its check, and its renaming.
 
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
-use super::super::pending::{PREFIX, SUFFIX, folder, place_by, sweep, sync_folder};
+use rayon::prelude::*;
+
+use super::super::lock::{Attempt, LockFile};
+use super::super::pending::{folder, ignore_missing, place, sweep, sync_folder};
 use super::super::{OutputError, partial};
-use super::manifest::{Manifest, SEALED, manifests, part_name, remove_parts};
-use super::{SetMode, SetPlan, Shard};
+use super::Shard;
+use super::manifest::{Manifest, SEALED, Sum, remove_parts};
+use super::occupy::{
+    LOCK, PATIENCE, PAUSE, busy, folders, generation, is_being_made, is_lock_name, remove_replaced, replaced,
+};
+
+/// Largest number of faults that a message names.
+const NAMED: usize = 20;
 
 /// Status of a set after a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,130 +32,211 @@ pub enum SetStatus {
     },
 }
 
-/// Creates the set's folder where needed, and checks that it may be written to. Returns the folder of its chunks:
-/// `path` itself where a complete set is resumed.
-pub(super) fn occupy(
-    path: &Path,
-    plan: &SetPlan,
-    shard: Shard,
-    start: SetMode,
-) -> Result<PathBuf, OutputError> {
-    let failed = |source| OutputError::Write { path: path.to_owned(), source };
-    if path.symlink_metadata().is_ok() {
-        if !path.is_dir() {
-            return Err(OutputError::NotAFolder { path: path.to_owned() });
-        }
-        match start {
-            SetMode::Create => return Err(OutputError::Exists { path: path.to_owned() }),
-            SetMode::Replace => drop(Manifest::sealed(path)?), // nothing but a set is replaced
-            SetMode::Resume => {
-                let sealed = Manifest::sealed(path)?;
-                sealed.check(plan, path)?;
-                let fault = sealed.chunks.values().flatten().find_map(|sum| sum.fault(path));
-                return match fault {
-                    Some(fault) => Err(OutputError::Damaged { path: path.to_owned(), fault }),
-                    None => Ok(path.to_owned()),
-                };
-            }
-        }
-    }
-    let root = partial(path);
-    match fs::create_dir(&root) {
-        Ok(()) => {}
-        Err(e) if e.kind() == io::ErrorKind::AlreadyExists && root.is_dir() => {}
-        Err(e) => return Err(failed(e)),
-    }
-    let is_set = !manifests(&root).map_err(failed)?.is_empty();
-    match start {
-        SetMode::Replace if is_set => {
-            fs::remove_dir_all(&root).and_then(|()| fs::create_dir(&root)).map_err(failed)?;
-        }
-        // Another process may have made the folder this very moment.
-        SetMode::Create if shard.count > 1 && !root.join(part_name(shard.index, shard.count)).exists() => {}
-        SetMode::Create if is_set => return Err(OutputError::Unfinished { path: path.to_owned(), root }),
-        SetMode::Create | SetMode::Replace | SetMode::Resume => {}
-    }
-    Ok(root)
+/// Check of the files of a set before it gets its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Depth {
+    /// That each is there, with its size: whoever wrote them ended just now.
+    Sizes,
+    /// That each has its sum.
+    Sums,
 }
 
-/// Claims a shard of a new set, which only one process can: of two that start at once, neither sees a manifest of the
-/// other. The name is one that sealing sweeps.
-pub(super) fn claim(path: &Path, root: &Path, shard: Shard, start: SetMode) -> Result<(), OutputError> {
-    let name = format!("{PREFIX}{}{SUFFIX}", part_name(shard.index, shard.count));
-    match fs::File::create_new(root.join(name)) {
-        Ok(_) => Ok(()),
-        Err(e) if e.kind() != io::ErrorKind::AlreadyExists => {
-            Err(OutputError::Write { path: path.to_owned(), source: e })
-        }
-        Err(_) if start == SetMode::Create => {
-            Err(OutputError::Unfinished { path: path.to_owned(), root: root.to_owned() })
-        }
-        Err(_) => Ok(()), // that of a run that was killed
-    }
-}
-
-/// Seals a set whose chunks other processes have written.
+/// Seals a set whose chunks other processes have written, once each file has its sum.
 pub fn merge(path: impl AsRef<Path>) -> Result<(), OutputError> {
-    let path = path.as_ref();
-    let path = PathBuf::from_iter(path.components());
-    let path = match path.to_string_lossy().strip_suffix(".partial") {
-        Some(name) => PathBuf::from(name),
-        None => path,
+    let path = PathBuf::from_iter(path.as_ref().components());
+    let path = match path.extension() {
+        Some(extension) if extension == "partial" => path.with_extension(""),
+        _ => path,
     };
-    match seal(&path, false)? {
+    if path.exists() && partial(&path).is_dir() {
+        return Err(OutputError::Exists { path });
+    }
+    match seal(&path, false, Depth::Sums, None)? {
         SetStatus::Sealed => Ok(()),
+        SetStatus::Waiting { done, chunks } if done == chunks => Err(busy(&partial(&path))),
         SetStatus::Waiting { done, chunks } => Err(OutputError::Incomplete { path, done, chunks }),
     }
 }
 
-/// Joins the manifests of a set's processes and gives the set its name, if all of it is there. Several processes may
-/// do this at once: each step is the same whoever takes it, and can be taken twice.
-pub(super) fn seal(path: &Path, replace: bool) -> Result<SetStatus, OutputError> {
+/// Joins the manifests of a set's processes and gives the set its name, if all of it is there and nobody writes to it.
+/// `own` is the mark of the set that this process wrote. Where the file system has no locks, several processes may do
+/// this at once: each step is the same whoever takes it, and can be taken twice.
+pub(super) fn seal(
+    path: &Path,
+    replace: bool,
+    depth: Depth,
+    own: Option<&str>,
+) -> Result<SetStatus, OutputError> {
     let root = partial(path);
-    match try_seal(path, &root, replace) {
-        // Another process was faster: what was to be renamed has its name.
-        Err(_) if !root.exists() && Manifest::sealed(path).is_ok() => Ok(SetStatus::Sealed),
-        result => result,
+    let begun = Instant::now();
+    loop {
+        let is_sealed = || !root.exists() && Manifest::sealed(path).is_ok();
+        let step = match step(path, &root, depth, own) {
+            // Another process was faster: what was to be renamed has its name.
+            Err(_) if is_sealed() => return Ok(SetStatus::Sealed),
+            step => step?,
+        };
+        let status = match step {
+            Step::Status(status) => status,
+            Step::Rename(manifest, lock) => match rename(path, &root, &manifest, lock, replace) {
+                Err(_) if is_sealed() => SetStatus::Sealed,
+                renamed => renamed.map(|()| SetStatus::Sealed)?,
+            },
+            Step::Again(status) if begun.elapsed() > PATIENCE => status, // the one that still writes will seal it
+            Step::Again(_) => {
+                std::thread::sleep(PAUSE);
+                continue;
+            }
+        };
+        return Ok(status);
     }
 }
 
-fn try_seal(path: &Path, root: &Path, replace: bool) -> Result<SetStatus, OutputError> {
+/// Next step of sealing.
+enum Step {
+    /// None.
+    Status(SetStatus),
+    /// Another look, unless much time has passed.
+    Again(SetStatus),
+    /// The name, under a lock where the file system has locks.
+    Rename(Box<Manifest>, LockFile),
+}
+
+fn step(path: &Path, root: &Path, depth: Depth, own: Option<&str>) -> Result<Step, OutputError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
-    let found = if root.is_dir() { Manifest::joined(root)? } else { None };
-    let Some(manifest) = found else {
-        return Err(OutputError::NotASet { path: if root.is_dir() { root } else { path }.to_owned() });
-    };
-    if !manifest.is_complete() {
-        let (done, chunks) = (manifest.chunks.len() as u64, manifest.plan.chunks());
-        return Ok(SetStatus::Waiting { done, chunks });
+    let manifest = whole(path, root)?;
+    let waiting = SetStatus::Waiting { done: manifest.chunks.len() as u64, chunks: manifest.plan.chunks() };
+    if own.is_some() && manifest.generation.is_some() && manifest.generation.as_deref() != own {
+        return Err(OutputError::Replaced { root: root.to_owned() });
     }
-    // Temporary files are made outside: one that is inside while another process renames would stay there. Theirs is a
-    // name that tells them from those of other files in that folder.
-    let by = folder(path);
-    let prefix = format!("{PREFIX}{}.seal-", path.file_name().unwrap_or_default().to_string_lossy());
-    let place = |name: &str, bytes: &[u8]| place_by(by, &prefix, &root.join(name), bytes).map_err(failed);
+    if !manifest.is_complete() {
+        return Ok(Step::Status(waiting));
+    }
+    let lock = LockFile::open(&root.join(LOCK)).map_err(failed)?;
+    match lock.try_exclusive() {
+        Attempt::Busy => return Ok(Step::Again(waiting)),
+        Attempt::Held if !lock.is_current() => return Ok(Step::Again(waiting)),
+        Attempt::Held | Attempt::Unsupported => {}
+    }
+    // Once more, now that nobody changes it.
+    let manifest = whole(path, root)?;
+    if own.is_some() && generation(&lock).as_deref() != own {
+        return Err(OutputError::Replaced { root: root.to_owned() });
+    }
+    if !manifest.is_complete() {
+        return Ok(Step::Again(waiting));
+    }
+    check(root, &manifest, depth)?;
+    Ok(Step::Rename(Box::new(manifest), lock))
+}
+
+/// Manifest of an unfinished set, joined.
+fn whole(path: &Path, root: &Path) -> Result<Manifest, OutputError> {
+    let found = if root.is_dir() { Manifest::joined(root)? } else { None };
+    found.ok_or_else(|| OutputError::NotASet { path: if root.is_dir() { root } else { path }.to_owned() })
+}
+
+/// Refuses a set whose files are not those that were written.
+fn check(root: &Path, manifest: &Manifest, depth: Depth) -> Result<(), OutputError> {
+    let sums: Vec<&Sum> = manifest.sums().collect();
+    let mut faults: Vec<String> = sums
+        .into_par_iter()
+        .filter_map(|sum| match depth {
+            Depth::Sizes => sum.size_fault(root),
+            Depth::Sums => sum.fault(root),
+        })
+        .collect();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    let more = faults.len().saturating_sub(NAMED);
+    faults.truncate(NAMED);
+    if more > 0 {
+        faults.push(format!("{more} more"));
+    }
+    Err(OutputError::DamagedParts { path: root.to_owned(), faults: faults.join(", ") })
+}
+
+/// Writes what describes the set to readers, and gives it its name.
+fn rename(
+    path: &Path,
+    root: &Path,
+    manifest: &Manifest,
+    lock: LockFile,
+    replace: bool,
+) -> Result<(), OutputError> {
+    let failed = |source| OutputError::Write { path: path.to_owned(), source };
+    if !replace && path.symlink_metadata().is_ok() {
+        return Err(OutputError::Exists { path: path.to_owned() });
+    }
+    let mut manifest = manifest.clone();
+    manifest.generation = None;
     let layout = manifest.plan.layout;
     for part in layout.metadata(&manifest.plan).map_err(failed)? {
-        place(&part.name, &part.bytes)?;
+        place(&root.join(&part.name), &part.bytes).map_err(failed)?;
+        manifest.note(Sum::of(&part));
     }
-    place(SEALED, manifest.text().as_bytes())?;
+    place(&root.join(SEALED), manifest.text().as_bytes()).map_err(failed)?;
     remove_parts(root).map_err(failed)?;
-    for folder in layout.folders(&manifest.plan) {
-        sweep(&root.join(&folder), PREFIX).map_err(failed)?;
-        sync_folder(&root.join(&folder));
+    remove_locks(root).map_err(failed)?;
+    for folder in folders(root).map_err(failed)? {
+        sweep(&folder).map_err(failed)?;
+        sync_folder(&folder);
     }
-    sweep(root, PREFIX).map_err(failed)?;
-    sync_folder(root);
-    match replace && path.exists() {
-        true => {
-            let old = partial(&root.with_extension("replaced"));
-            fs::rename(path, &old).map_err(failed)?;
-            fs::rename(root, path).map_err(failed)?;
-            fs::remove_dir_all(old).map_err(failed)?;
+    let mut lock = Some(lock);
+    if cfg!(windows) {
+        lock = None; // no folder is renamed there in which a file is open
+    }
+    if replace && path.exists() {
+        let old = replaced(path);
+        remove_replaced(path).map_err(failed)?;
+        fs::rename(path, &old).map_err(failed)?;
+        fs::rename(root, path).map_err(failed)?;
+    } else {
+        fs::rename(root, path).map_err(failed)?;
+    }
+    // Others may wait for the lock, and find the set under its name once they have it.
+    fs::remove_file(path.join(LOCK)).or_else(ignore_missing).map_err(failed)?;
+    drop(lock);
+    remove_replaced(path).map_err(failed)?;
+    sync_folder(folder(path));
+    Ok(())
+}
+
+/// Removes the locks of shards, which nobody holds who does not hold that of the folder.
+fn remove_locks(root: &Path) -> std::io::Result<()> {
+    for entry in fs::read_dir(root)? {
+        let entry = entry?;
+        if entry.file_name().to_str().is_some_and(is_lock_name) {
+            fs::remove_file(entry.path()).or_else(ignore_missing)?;
         }
-        false => fs::rename(root, path).map_err(failed)?,
     }
-    sweep(by, &prefix).map_err(failed)?;
-    sync_folder(by);
-    Ok(SetStatus::Sealed)
+    Ok(())
+}
+
+/// Names the shards of an unfinished set that are not done and that no process makes; `None` where there are none.
+pub(super) fn abandoned(path: &Path, count: u64) -> Option<String> {
+    let root = partial(path);
+    let manifest = Manifest::joined(&root).ok()??;
+    let is_abandoned = |&index: &u64| {
+        let shard = Shard { index, count };
+        let own = shard.of(manifest.plan.chunks());
+        (manifest.chunks.range(own.clone()).count() as u64) < own.end - own.start
+            && !is_being_made(&root, shard)
+    };
+    let left: Vec<u64> = (1..=count).filter(is_abandoned).collect();
+    let mut ranges: Vec<(u64, u64)> = Vec::new();
+    for &index in &left {
+        match ranges.last_mut() {
+            Some((_, last)) if *last + 1 == index => *last = index,
+            _ => ranges.push((index, index)),
+        }
+    }
+    let names = ranges.iter().map(|&(a, b)| if a == b { a.to_string() } else { format!("{a}-{b}") });
+    let names = names.collect::<Vec<_>>().join(",");
+    match left.len() {
+        0 => None,
+        1 => Some(format!("part {names} is missing")),
+        _ => Some(format!("parts {names} are missing")),
+    }
 }

@@ -34,11 +34,15 @@ pub(super) fn chunk<'a>(
             if bytes.len() < size {
                 bytes.to_mut().resize(size, 0);
             }
-            let others = ".0".repeat(field.shape(0).len() - 1);
-            let name = format!("{}/c.{index}{others}", field.name);
-            Ok(Part { name, bytes: pack(bytes, level)? })
+            Ok(Part { name: chunk_name(field, index), bytes: pack(bytes, level)? })
         })
         .collect()
+}
+
+/// Name of the file of a field in a chunk.
+pub(super) fn chunk_name(field: &Field, index: u64) -> String {
+    let others = ".0".repeat(field.shape(0).len() - 1);
+    format!("{}/c.{index}{others}", field.name)
 }
 
 #[cfg(feature = "zstd")]
@@ -51,8 +55,10 @@ fn pack(bytes: Cow<[u8]>, level: Level) -> io::Result<Cow<[u8]>> {
 
 #[cfg(not(feature = "zstd"))]
 fn pack(bytes: Cow<[u8]>, level: Level) -> io::Result<Cow<[u8]>> {
-    assert!(level.is_none(), "Layout::check refuses what was not compiled in");
-    Ok(bytes)
+    match level {
+        Some(_) => Err(io::Error::other("this build leaves out Zstandard: build it with the feature zstd")),
+        None => Ok(bytes),
+    }
 }
 
 /// Encodes the files that describe the chunks to readers; the one that makes them a data set is last.
