@@ -1,5 +1,5 @@
 # Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
-.PHONY: demo test exhaustive bench driver python
+.PHONY: demo test exhaustive mutants bench driver python
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
@@ -17,9 +17,19 @@ demo:
 test: driver python
 	cargo test --locked --release
 
-# What takes minutes: all 2^32 words through the radius and the circle, and the statistics under 200 seeds.
-exhaustive:
-	cargo test --locked --release --lib --test statistics -- --ignored --nocapture
+# What takes minutes: all 2^32 words through the radius and the circle, the statistics under 200 seeds, and the fit on
+# 100,000 matrices and 1,000 small files.
+exhaustive: python
+	cargo test --locked --release --lib --test statistics --test fit -- --ignored --nocapture
+
+# Small changes of the code, of which a test must notice each: a sample of those in a room, as in `make mutants ROOM=cover`.
+# Minutes each room; `cargo install cargo-mutants` comes first.
+ROOM ?= program
+SAMPLE ?= 0/8
+mutants: driver python
+	cargo mutants --in-place --profile mutants --file 'src/$(ROOM)/**' --file 'src/$(ROOM).rs' --shard $(SAMPLE) \
+		--sharding round-robin --no-shuffle --baseline skip --timeout 300 -o target \
+		--no-default-features --features cli -- --lib --tests
 
 # In-process and whole-process rates, beside NumPy and Numba.
 bench: driver python

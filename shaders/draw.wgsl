@@ -5,6 +5,8 @@ struct Draw {
     z: Normals,
     // The candidates it took; 0 where none of `max_attempts` was accepted.
     attempts: u32,
+    // The number of the candidate that comes next. // if sliced
+    tried: u32, // if sliced
     // What multiplies its spectrum. // if scaled
     scale: f32, // if scaled
     // The target luminous reflectance that is its own. // if own_targets
@@ -12,10 +14,13 @@ struct Draw {
 }
 
 // The loop ends by its condition and not by `break`: llvmpipe runs that form a quarter faster.
-fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, max_attempts: u32) -> Draw {
+fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, max_attempts: u32) -> Draw { // if whole
+fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, first: u32, end: u32) -> Draw { // if sliced
     var result: Draw;
     result.target_lrv = target_lrv_of(key, index, stream); // if own_targets
-    for (var attempt = 0u; attempt < max_attempts && result.attempts == 0u; attempt++) {
+    for (var attempt = 0u; attempt < max_attempts && result.attempts == 0u; attempt++) { // if whole
+    var attempt = first; // if sliced
+    for (; attempt < end && result.attempts == 0u; attempt++) { // if sliced
         let z = normals(key, index, stream, attempt); // if plain
         let accepted = is_accepted(JUDGED); // if plain
         let c = candidate(key, index, stream, attempt); // if covered
@@ -24,6 +29,7 @@ fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, max_attempts: u32) -> 
         result.z = z;
         result.attempts = select(0u, attempt + 1u, accepted);
     }
+    result.tried = attempt; // if sliced
     result.scale = scale(SCALED); // if scaled
     return result;
 }

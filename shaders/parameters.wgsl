@@ -10,6 +10,8 @@ struct Parameters {
     plane: u32,
     // How many draws a row has; 0 where there are no rows.
     row: u32,
+    // The most candidates of a draw in one dispatch. // if sliced
+    slice: u32, // if sliced
 }
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
@@ -22,5 +24,12 @@ fn draw_at(i: u32) -> Draw {
     if parameters.row != 0u {
         index = vec2(low % parameters.row, parameters.first.y + low / parameters.row);
     }
-    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts);
+    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts); // if whole
+    let before = progress[i]; // if sliced
+    let attempts = attempts_of(before); // if sliced
+    let first = select(before & ~UNDONE, attempts - 1u, attempts != 0u); // if sliced
+    let end = select(min(first + parameters.slice, parameters.max_attempts), attempts, attempts != 0u); // if sliced
+    let drawn = draw_of(parameters.key, index, parameters.stream, first, end); // if sliced
+    progress[i] = select(drawn.tried | UNDONE, drawn.attempts, drawn.attempts != 0u); // if sliced
+    return drawn; // if sliced
 }

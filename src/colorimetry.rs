@@ -93,6 +93,36 @@ mod tests {
         }
     }
 
+    /// CIE 15:2004, tables T.1 and T.4.
+    #[test]
+    fn observer_and_illuminants_have_their_published_numbers() {
+        let close = |found: &[f64], published: &[f64], error: f64| {
+            assert_eq!(found.len(), published.len());
+            for (a, b) in found.iter().zip(published) {
+                assert!((a - b).abs() <= error * b.abs(), "{found:?} {published:?}");
+            }
+        };
+        let grid = "400:50:700".parse().unwrap();
+        let [x, y, z] = cmf(grid);
+        close(&x, &[0.01431, 0.3362, 0.0049, 0.4334499, 1.0622, 0.2835, 0.011359], 2e-3);
+        close(&y, &[0.000396, 0.038, 0.323, 0.9949501, 0.631, 0.107, 0.004102], 2e-3);
+        close(&z[..5], &[0.06785001, 1.77211, 0.272, 0.008749999, 0.0008], 2e-3);
+        close(&d65(grid), &[82.7549, 117.008, 109.354, 104.046, 90.0062, 80.0268, 71.6091], 1e-4);
+        close(&illuminant_a(grid), &[14.708, 33.0859, 59.8611, 92.912, 129.043, 165.028, 198.261], 1e-5);
+        let fine: Grid = "380:1:780".parse().unwrap();
+        let chromaticity = |light: &[f64]| {
+            let [x, y, z] = cmf(fine).map(|f| f.iter().zip(light).map(|(f, e)| f * e).sum::<f64>());
+            [x / (x + y + z), y / (x + y + z)]
+        };
+        close(&chromaticity(&d65(fine)), &[0.31272, 0.32903], 5e-5);
+        close(&chromaticity(&illuminant_a(fine)), &[0.44758, 0.40745], 5e-5);
+        close(&chromaticity(&[1.0; 401]), &[0.33331, 0.33329], 5e-4);
+        // The luminances of the primaries of Rec. 709.
+        let luminance = |linear| linear_srgb_to_xyz(linear)[1];
+        let primaries = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(luminance);
+        close(&primaries, &[0.2126, 0.7152, 0.0722], 1e-3);
+    }
+
     #[test]
     fn components_and_tristimulus_values_are_inverses() {
         let linear = [0.2, 0.7, 0.4];

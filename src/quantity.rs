@@ -17,7 +17,7 @@ pub enum Quantity {
     /// white has Y = 1; of an illuminant its own.
     Xyz,
     /// Linear Rec. 709 components R, G, B (IEC 61966-2-1) of the tristimulus values, unclamped: outside the gamut
-    /// they are negative or above 1.
+    /// they are negative or above 1. The matrix is that of D65, and nothing is adapted to another white.
     LinearSrgb,
     /// The luminous reflectance (LRV) of a reflectance: CIE Y of the 1931 2 degree observer under D65, 1 for a
     /// perfect white.

@@ -9,7 +9,10 @@ use crate::program::Program;
 use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
-use crate::wgsl::{self, COVER_AT, Dialect, OUTPUTS_AT, PARAMETERS_AT, TABLES_AT, Tables};
+use crate::wgsl::{self, COVER_AT, Dialect, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT, TABLES_AT, Tables};
+
+/// The most dispatches that are recorded for one range: its draws take no more candidates than these try.
+const MOST_SLICES: u32 = 1024;
 
 /// A recipe's compute pipeline on a wgpu device, to be recorded into its host's command encoders.
 ///
@@ -41,6 +44,8 @@ pub struct Sampler {
     /// Formats of the output arrays.
     formats: Vec<ArrayFormat>,
     max_attempts: u32,
+    /// Number of candidates of a draw that one dispatch tries.
+    slice: u32,
     draws_per_thread: u32,
 }
 
@@ -58,6 +63,13 @@ pub enum SamplerError {
          (max_storage_buffers_per_shader_stage): ask for fewer quantities at once"
     )]
     TooManyBuffers { buffers: u32, largest: u32 },
+    #[error("{0} bands, which are too many for one draw of a shader: draw on the CPU")]
+    TooManyBands(usize),
+    #[error(
+        "draws of up to {attempts} candidates, of which dispatches that are recorded together try {largest} at most: \
+         allow no more"
+    )]
+    TooManyAttempts { attempts: u32, largest: u32 },
     #[error(
         "a range of {count} draws, where room for {prepared} was prepared: prepare the largest range first"
     )]
@@ -75,7 +87,8 @@ struct Parameters {
     max_attempts: u32,
     plane: u32,
     row: u32,
-    padding: [u32; 3],
+    slice: u32,
+    padding: [u32; 2],
 }
 
 impl Sampler {
@@ -99,7 +112,12 @@ impl Sampler {
         text: String,
         tables: &Tables,
     ) -> Result<Sampler, SamplerError> {
-        let others = [!tables.values.is_empty(), program.proposal.is_some()];
+        let slice = wgsl::attempts_per_dispatch(program, target);
+        if slice == 0 {
+            return Err(SamplerError::TooManyBands(program.bands()));
+        }
+        let others =
+            [!tables.values.is_empty(), program.proposal.is_some(), wgsl::is_sliced(program, target)];
         let buffers = (program.outputs.len() + others.into_iter().filter(|&there| there).count()) as u32;
         let largest = device.limits().max_storage_buffers_per_shader_stage;
         if buffers > largest {
@@ -139,6 +157,7 @@ impl Sampler {
             cover,
             formats: program.outputs.iter().map(|output| output.format).collect(),
             max_attempts: program.max_attempts,
+            slice,
             draws_per_thread: wgsl::draws_per_thread(program, target),
         })
     }
@@ -151,6 +170,11 @@ impl Sampler {
             (true, wgpu::DeviceType::Cpu) => Dialect::SoftwareInt64,
             (true, _) => Dialect::Int64,
         }
+    }
+
+    /// Number of dispatches that a range takes whose draws may take all the candidates that they are allowed.
+    pub(crate) fn slices(&self) -> u32 {
+        self.max_attempts.div_ceil(self.slice)
     }
 
     /// Formats of the output arrays, in the order of [`Quantity`].
@@ -182,6 +206,10 @@ impl Sampler {
 
     /// Allocates buffers for `draws`, and prepares to record them.
     pub fn prepare(&self, device: &Device, draws: DrawRange) -> Result<Prepared, SamplerError> {
+        let largest = self.slice.saturating_mul(MOST_SLICES);
+        if self.max_attempts > largest {
+            return Err(SamplerError::TooManyAttempts { attempts: self.max_attempts, largest });
+        }
         self.prepare_for(device, draws, BufferUsages::COPY_SRC)
     }
 
@@ -212,10 +240,19 @@ impl Sampler {
             contents: bytemuck::bytes_of(&self.parameters(draws)),
             usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
         });
+        let progress = (self.slices() > 1).then(|| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("spectroll progress"),
+                size: 4 * capacity,
+                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        });
         let at = |format: &ArrayFormat| OUTPUTS_AT + format.quantity as u32;
         let entries: Vec<_> = std::iter::once((PARAMETERS_AT, &parameters))
             .chain(self.tables.iter().map(|tables| (TABLES_AT, tables)))
             .chain(self.cover.iter().map(|cover| (COVER_AT, cover)))
+            .chain(progress.iter().map(|progress| (PROGRESS_AT, progress)))
             .chain(self.formats.iter().map(at).zip(&outputs))
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
@@ -225,7 +262,7 @@ impl Sampler {
             entries: &entries,
         });
         let (count, prepared) = (draws.count, draws.count);
-        Ok(Prepared { sampler: self.clone(), bindings, parameters, outputs, count, prepared })
+        Ok(Prepared { sampler: self.clone(), bindings, parameters, progress, outputs, count, prepared })
     }
 
     fn parameters(&self, draws: DrawRange) -> Parameters {
@@ -237,7 +274,8 @@ impl Sampler {
             max_attempts: self.max_attempts,
             plane: draws.count.next_multiple_of(4) as u32,
             row: draws.stream.row(),
-            padding: [0; 3],
+            slice: self.slice,
+            padding: [0; 2],
         }
     }
 }
@@ -248,6 +286,8 @@ pub struct Prepared {
     sampler: Sampler,
     bindings: wgpu::BindGroup,
     parameters: wgpu::Buffer,
+    /// Progress of each draw, where one dispatch may not end them all.
+    progress: Option<wgpu::Buffer>,
     /// Buffers, in the order of the sampler's formats.
     outputs: Vec<wgpu::Buffer>,
     count: u64,
@@ -258,6 +298,20 @@ pub struct Prepared {
 impl Prepared {
     /// Records a compute pass that fills the buffers.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder) {
+        self.record_first(encoder);
+        (1..self.sampler.slices()).for_each(|_| self.record_next(encoder));
+    }
+
+    /// Records the first of the [`slices`](Sampler::slices) that fill the buffers.
+    pub(crate) fn record_first(&self, encoder: &mut wgpu::CommandEncoder) {
+        if let Some(progress) = &self.progress {
+            encoder.clear_buffer(progress, 0, None);
+        }
+        self.record_next(encoder);
+    }
+
+    /// Records one more slice: draws that are not done try the candidates that come next.
+    pub(crate) fn record_next(&self, encoder: &mut wgpu::CommandEncoder) {
         let descriptor = wgpu::ComputePassDescriptor { label: Some("spectroll"), timestamp_writes: None };
         let mut pass = encoder.begin_compute_pass(&descriptor);
         pass.set_pipeline(&self.sampler.pipeline);
@@ -277,6 +331,11 @@ impl Prepared {
     /// Formats of the arrays in the buffers. Planes are `count` draws apart, rounded up to a multiple of 4.
     pub fn formats(&self) -> &[ArrayFormat] {
         &self.sampler.formats
+    }
+
+    /// Number of slices that fill the buffers.
+    pub(crate) fn slices(&self) -> u32 {
+        self.sampler.slices()
     }
 
     /// Buffers, in the order of the formats.

@@ -230,3 +230,27 @@ fn what_is_not_a_model_says_why() {
     let error = Model::load(Path::new("no such model.json")).unwrap_err().to_string();
     assert!(error.contains("no such model.json"), "{error}");
 }
+
+/// Fits this many small data sets with the program; see `fit_small.py`.
+fn assert_small_fits(count: u32) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or("python3".to_owned());
+    let output = Command::new(&python)
+        .arg(root.join("tests/fit_small.py"))
+        .args([env!("CARGO_BIN_EXE_spectroll"), &count.to_string()])
+        .output()
+        .unwrap_or_else(|e| panic!("cannot run {python}: {e}"));
+    println!("{}", String::from_utf8_lossy(&output.stdout));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn small_data_sets_agree_with_numpy() {
+    assert_small_fits(60);
+}
+
+#[test]
+#[ignore = "half a minute; `make exhaustive` runs it"]
+fn a_thousand_small_data_sets_agree_with_numpy() {
+    assert_small_fits(1000);
+}

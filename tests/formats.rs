@@ -43,10 +43,81 @@ fn sixteen_bits_keep_spectra_physical() {
     succeeds(folder.path(), "sample munsell-vrhel -n 20000 --lrv 0.95 --bounds scaled --dtype f16 -o a.npy");
     let code = "import numpy as np; a = np.load('a.npy'); print(a.dtype, (a > 0).all(), (a < 1).all(), a.max() == 1 - 2**-11)";
     assert_eq!(python(folder.path(), code), "float16 True True True");
-    succeeds(folder.path(), "sample granada -n 1000 --intensity 1e-9..1e-8 --dtype f16 -o b.npy");
-    assert_eq!(python(folder.path(), "import numpy as np; print((np.load('b.npy') > 0).all())"), "True");
-    let bright = "sample granada -n 1000 --intensity 1e4..1e6 --dtype f16 -o c.npy";
-    fails(folder.path(), bright, 1, "do not fit float16, which ends at 65504: use float32");
+    // Text is read back as what the other formats hold.
+    succeeds(folder.path(), "sample munsell-vrhel -n 20000 --lrv 0.95 --bounds scaled --dtype f16 -o a.csv");
+    let code = "import numpy as np; a = np.load('a.npy')\n\
+                b = np.loadtxt('a.csv', delimiter=',', skiprows=1).astype(np.float16)\n\
+                print(a.tobytes() == b.tobytes())";
+    assert_eq!(python(folder.path(), code), "True");
+}
+
+/// Below the normal range of float16 spectra lose digits, and below its last number all of them.
+#[test]
+fn spectra_that_sixteen_bits_cannot_hold_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let too_bright = "do not fit float16, which ends at 65504: use float32 (--dtype f32)";
+    let too_dim = "do not fit float16, which loses digits below 6.1e-5: use float32 (--dtype f32)";
+    for output in ["c.npy", "c.npz", "c.csv", "c.h5", "c.zarr"] {
+        for (intensity, message) in
+            [("1e4..1e6", too_bright), ("1e-12..1e-9", too_dim), ("1e-6..1e-4", too_dim)]
+        {
+            let run = format!(
+                "sample granada -n 1000 --intensity {intensity} --dtype f16 --engine cpu -o {output}"
+            );
+            let result = program::spectroll(folder, &run);
+            let text = String::from_utf8(result.stderr).unwrap();
+            assert_eq!(result.status.code(), Some(1), "{run}: {text}");
+            assert!(
+                text.contains(message) || output == "c.zarr" && text.contains("do not fit float16"),
+                "{text}"
+            );
+            if output == "c.zarr" {
+                fs::remove_dir_all(folder.join("c.zarr.partial")).unwrap();
+            }
+        }
+    }
+    let piped = "sample granada -n 10 --intensity 1e-9 --dtype f16 --engine cpu -o -";
+    fails(folder, piped, 1, too_dim);
+    succeeds(folder, "sample granada -n 1000 --intensity 1e-3..1e3 --dtype f16 --engine cpu -o d.npy");
+    let text = "sample granada -n 5 --dtype f64 --engine cpu -o x.spd";
+    fails(folder, text, 2, ".spd files hold f32 alone, as text; leave out the type (--dtype)");
+}
+
+/// What all scenes share is of the type that was asked for, as what differs between them is.
+#[test]
+fn shared_arrays_have_the_type_that_was_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scene = "scene --example condition2 --scenes 0..2 --engine cpu";
+    succeeds(folder, &format!("{scene} -o a.npz"));
+    for (dtype, name) in [("f16", "float16"), ("f64", "float64")] {
+        for output in ["b.npz", "b.h5", "b.zarr", "b/ --format npy"] {
+            succeeds(folder, &format!("{scene} --dtype {dtype} -o {output} --force"));
+        }
+        let code = format!(
+            "import numpy as np, h5py, zarr\n\
+             a = np.load('a.npz')['background'].astype('{name}')\n\
+             bs = [np.load('b.npz')['background'], h5py.File('b.h5')['background'][:], \
+             zarr.open('b.zarr', mode='r')['background'][:], np.load('b/background.npy')]\n\
+             print([b.dtype == a.dtype and (b == a).mean() > 0.999 for b in bs], \
+             np.load('b.npz')['background_attempts'].dtype)"
+        );
+        assert_eq!(python(folder, &code), "[True, True, True, True] uint32", "{dtype}");
+        succeeds(folder, "verify b.zarr --redraw 1 --engine cpu");
+        let (plan, _) = succeeds(folder, &format!("{scene} --dtype {dtype} -o c.npz --dry-run"));
+        for array in ["background: [999, 31]", "lights: [2, 3, 31]"] {
+            assert!(plan.contains(&format!("{array} {name}")), "{plan}");
+        }
+    }
+    succeeds(folder, &format!("{scene} --dtype f64 -o b.mat"));
+    let code = "import numpy as np, scipy.io; m = scipy.io.loadmat('b.mat')\n\
+                a = np.load('a.npz')['background'].astype(float)\n\
+                print(m['sur_background'].dtype, (m['sur_background'].T == a).all())";
+    assert_eq!(python(folder, code), "float64 True");
+    // Where nothing but what is shared would be in 16 bits, too.
+    let walls = "scene --example condition2 --only background --engine cpu --dtype f16";
+    fails(folder, &format!("{walls} -o c.mat"), 2, "choose one of them (--dtype)");
 }
 
 /// An LRV of 0.4 in half precision is 0.39990; labels are few, and are exact.

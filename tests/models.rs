@@ -195,3 +195,30 @@ fn a_fit_takes_a_share_of_the_variance_and_a_scale() {
     );
     assert!((model("percent.json").parts().mean[0] - 0.5).abs() < 1e-12);
 }
+
+/// The figures of the method's page: how far accepted draws are from the data that the model was fitted to.
+#[test]
+fn draws_are_shown_beside_the_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let command = "inspect munsell-vrhel --data munsell vrhel -o beside.svg --json";
+    let (text, _) = succeeds(folder.path(), command);
+    let facts: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let comparison = &facts["comparison"];
+    assert_eq!((&comparison["spectra"], &comparison["draws"]), (&632.into(), &20_000.into()));
+    let shift = comparison["weights"][0]["mean_shift"].as_f64().unwrap();
+    assert!((shift - 0.34).abs() < 0.03, "{shift}");
+    let svg = std::fs::read_to_string(folder.path().join("beside.svg")).unwrap();
+    assert!(svg.contains("munsell (462 spectra), vrhel (170 spectra) and 20,000 draws of seed 0"));
+    let (text, _) = succeeds(folder.path(), "inspect munsell-vrhel --data munsell vrhel");
+    assert!(text.lines().all(|line| line.chars().count() <= 80 && line.trim_end() == line), "{text}");
+    for (arguments, code, message) in [
+        ("munsell-vrhel --data granada", 2, "the model is one of reflectances, and these are not"),
+        ("munsell-vrhel --data none.csv", 4, "cannot read"),
+        ("munsell-vrhel --data munsel", 2, "did you mean munsell"),
+        ("munsell-vrhel --data munsell --scale 100", 2, "pass --scale 0.01"),
+        ("munsell-vrhel --scale 2", 2, "--data"),
+        ("munsell-vrhel --lrv 0.999 --data munsell", 1, "0.995928"),
+    ] {
+        fails(folder.path(), &format!("inspect {arguments}"), code, message);
+    }
+}

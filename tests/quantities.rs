@@ -247,3 +247,26 @@ fn values_are_those_of_f64() {
         assert!(of_white < 5e-7, "{name}: {of_white:e} of white");
     }
 }
+
+/// Spectra in 16 bits that would lose their digits: what they may be is known before they are drawn.
+#[test]
+fn dim_spectra_are_not_asked_for_in_sixteen_bits() {
+    let halves = |recipe: RecipeBuilder| recipe.spectra_dtype(Dtype::F16).build().map(|_| ());
+    let dim = lights().intensity(Intensity::LogUniform(1e-12, 1.0));
+    let error = halves(dim.clone()).expect_err("some are dim").to_string();
+    assert!(
+        error.contains("do not fit float16, which loses digits below 6.1e-5: ask for float32"),
+        "{error}"
+    );
+    for recipe in
+        [lights().intensity(Intensity::Fixed(1e-6)), surfaces().lrv(1e-6), surfaces().lrv(1e-6..0.5)]
+    {
+        assert!(halves(recipe).is_err());
+    }
+    for recipe in [lights().intensity(Intensity::LogUniform(1e-3, 1.0)), surfaces(), surfaces().lrv(1e-3)] {
+        assert_eq!(halves(recipe), Ok(()));
+    }
+    // In 32 bits they fit, and where there are no spectra nothing has to.
+    assert!(dim.clone().build().is_ok());
+    assert_eq!(halves(dim.quantities([Quantity::Xyz])), Ok(()));
+}

@@ -348,6 +348,8 @@ fn a_host_has_spectra_all_the_same() {
         assert!(found.len() >= expected.len() && found.iter().zip(&expected).all(close), "{group}");
     }
     assert!(prepared.values("hues_xyz").is_some());
+    assert_eq!(prepared.values("lamps_intensity"), Some([3.0; 2].as_slice()));
+    assert_eq!(prepared.values("twins_intensity").map(<[f32]>::len), Some(2 * 4));
 }
 
 /// In a host's encoder the buffers hold what an engine draws.

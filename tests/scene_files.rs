@@ -52,6 +52,9 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
     write("fine.json", &fine.to_json());
     write("two.csv", "380,1,2\n540,1,2\n780,1,2\n");
     write("short.csv", "500,1\n540,2\n600,3\n");
+    let dips =
+        (40..=70).map(|ten| format!("{ten}0,{}\n", if ten == 50 { -1 } else { 2 })).collect::<String>();
+    write("negative.csv", &dips);
     let coarse = Scene::parse("ok.toml", &file("", "seed", ""), folder.path());
     assert!(coarse.is_ok(), "the file that is changed below is a good one");
 
@@ -248,6 +251,34 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
             &["line 15, hue", "narrow the ranges"],
         ),
         ("target", "flat", "flat = \"no\"", &["line 16, flat", "true or false"]),
+        ("target", "flat", "flat = true", &["line 14, model of \"target\"", "a flat target", "leave it out"]),
+        ("target", "model", "flat = true\ncov_scale = 1", &["line 15, cov_scale", "leave it out"]),
+        ("target", "model", "flat = true\nmax_attempts = 9", &["line 15, max_attempts", "leave it out"]),
+        (
+            "target",
+            "lrv",
+            "lrv = { from = 0.2, to = 0.6, levels = 1 }",
+            &["line 15, lrv.levels", "write lrv = 0.2", "2 levels or more"],
+        ),
+        (
+            "target",
+            "lrv",
+            "lrv = { uniform = [0.98, 0.9955] }\nbounds = \"scaled\"",
+            &["line 15, lrv of \"target\"", "a list of levels", "from = 0.98, to = 0.9955, levels = 10"],
+        ),
+        (
+            "target",
+            "lrv",
+            "lrv = 0.99\nbounds = \"scaled\"\nmax_attempts = 20",
+            &["line 15, lrv of \"target\"", "attempts or more"],
+        ),
+        (
+            "illuminant",
+            "mean",
+            "mean = \"negative.csv\"",
+            &["line 8, mean of \"lights\"", "at 500 nm is -", "raise it to 0"],
+        ),
+        ("surface", "name", "name = \"iocxo\"", &["line 9, name of \"iocxo\"", "stream 0", "another name"]),
         ("", "surface", "surface = 3", &["surface", "double brackets"]),
         ("", "seed", "seed = = 1", &["line 2", "this is not TOML"]),
     ];
@@ -276,6 +307,14 @@ fn what_no_line_is_to_blame_for() {
     let message = error(&copies, Path::new(""));
     assert!(
         message.contains("line 16, copies of \"target\"") && message.contains("from, to, levels"),
+        "{message}"
+    );
+    let twins = file("surface", "name", "name = \"board-501\"").replace("\"lights\"", "\"lights-725\"");
+    let message = error(&twins, Path::new(""));
+    assert!(
+        message.contains(
+            "line 9, name of \"board-501\": by its hash \"lights-725\" has the same random numbers"
+        ),
         "{message}"
     );
     let bounds = file("target", "lrv", "xyz = [0.3, 0.3, 0.3]\nbounds = \"scaled\"");

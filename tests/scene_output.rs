@@ -182,6 +182,80 @@ fn matlab_has_names_of_groups() {
     fails(folder, "fit a.mat -o x.json", 4, "several matrices of spectra");
 }
 
+/// Copies are not draws: 5 rounds through 10 levels have 5 draws, and one shape for the data set has 1.
+#[test]
+fn copies_are_counted_as_the_draws_that_they_are_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let target =
+        "[[target]]\nmodel = \"munsell-vrhel\"\nlrv = { from = 0.5, to = 0.95, levels = 10 }\ncount = 4\n";
+    let same = format!("{target}name = \"same\"\ncopies = \"same_shape\"\n");
+    let rounds = format!("{target}name = \"rounds\"\ncopies = \"scaled\"\n");
+    fs::write(folder.join("copies.toml"), format!("scenes = 400\n{same}{rounds}{target}name = \"own\"\n"))
+        .unwrap();
+    let json = |scenes: &str| -> serde_json::Value {
+        let run = format!("scene copies.toml --engine cpu --scenes {scenes} -o a.npz --force --json");
+        serde_json::from_str(&succeeds(folder, &run).0).unwrap()
+    };
+    let all = json("0..400");
+    let counts = |json: &serde_json::Value, key: &str| -> Vec<u64> {
+        let drawn = json["drawn"].as_array().unwrap();
+        drawn.iter().map(|group| group[key].as_u64().unwrap()).collect()
+    };
+    assert_eq!(counts(&all, "draws"), [4, 160, 1600]);
+    assert_eq!(all["draws"], 4 + 160 + 1600);
+    let code = "import numpy as np; a = np.load('a.npz')\n\
+                print([int(a['same_attempts'][0].sum()), int(a['rounds_attempts'][::10].sum())])";
+    assert_eq!(format!("{:?}", &counts(&all, "attempts")[..2]), python(folder, code));
+    // Spectra that reach 1 are no more than there are draws.
+    assert!(
+        counts(&all, "above_one").iter().zip(counts(&all, "draws")).all(|(above, draws)| *above <= draws)
+    );
+    assert!(counts(&all, "above_one")[1] > 0);
+    // A run that begins within a round draws for the rest of it.
+    assert_eq!(counts(&json("5..15"), "draws"), [4, 8, 40]);
+    let (plan, _) = succeeds(folder, "scene copies.toml --engine cpu --dry-run");
+    assert!(plan.contains("same: 4 drawn once") && plan.contains("rounds: 4 for each 10 scenes"), "{plan}");
+}
+
+/// One number for all lights is an array as well, which all scenes share.
+#[test]
+fn a_fixed_intensity_is_written_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(
+        folder.join("mine.toml"),
+        SCENE
+            .replace("{ log_uniform = [0.15, 150], shared = true }", "3")
+            .replace("count = 2\nintensity", "count = 2\nfixed = true\nintensity"),
+    )
+    .unwrap();
+    for output in ["a.npz", "a.zarr", "a.h5", "a.mat", "a.csv", "a.parquet", "a.spd"] {
+        succeeds(folder, &format!("scene mine.toml --engine cpu --scenes 0..2 -o {output}"));
+    }
+    let code = "import numpy as np; print(np.load('a.npz')['lights_intensity'].tolist())";
+    assert_eq!(python(folder, code), "[3.0, 3.0]");
+    let csv = fs::read_to_string(folder.join("a.csv")).unwrap();
+    assert!(csv.lines().next().unwrap().contains("lights_intensity_0,lights_intensity_1"), "{csv}");
+    succeeds(folder, "verify a.zarr --redraw 1 --engine cpu");
+}
+
+/// As a program needs to know as well as a person.
+#[test]
+fn a_dry_run_tells_the_room_in_both_forms() {
+    let (folder, scene) = scene();
+    let (plan, _) = succeeds(folder.path(), &format!("{scene} -o a.npz --dtype f64 --dry-run"));
+    assert!(plan.contains("are free in"), "{plan}");
+    let (json, _) = succeeds(folder.path(), &format!("{scene} -o a.npz --dtype f64 --dry-run --json"));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!(json["free"].as_u64().is_some_and(|free| free > 1 << 20), "{json}");
+    // Lights, walls and targets, and beside them 2 + 4 labels and 3 times some attempts.
+    let bytes = 8 * 31 * (4 + 3 + 4) + 8 * (2 + 4) + 4 * (4 + 3 + 4);
+    assert_eq!((json["bytes"].as_u64(), json["least"].as_u64()), (Some(bytes), Some(bytes)));
+    let (json, _) = succeeds(folder.path(), &format!("{scene} --dry-run --json"));
+    assert!(serde_json::from_str::<serde_json::Value>(&json).unwrap().get("free").is_none());
+}
+
 #[test]
 fn another_seed_is_recorded() {
     let (folder, scene) = scene();

@@ -6,13 +6,13 @@
 
 mod engines;
 
-use engines::{cpu, gpu};
+use engines::{cpu, gpu, surfaces};
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use spectroll::evaluation::statistics::tinted;
 use spectroll::{
     Bounds, BuiltinTable, Dataset, DrawRange, DrawStatus, Engine, EngineError, Extrapolation, Fit, Grid, Lrv,
-    Model, ModelParts, Real, Recipe, SpectrumKind, Stream, colorimetry,
+    Model, ModelParts, ProposalKind, Real, Recipe, SpectrumKind, Stream, colorimetry,
 };
 
 /// How far an adapter that fuses may be off, in units in the last place of the largest term.
@@ -265,6 +265,55 @@ fn models_too_large_for_straight_lines() {
         assert_twins(&Case::new(&twelve, Some((0.6, bounds)), 1.0), draws);
         assert_twins(&Case::in_range(&twelve, 0.2, 0.6, bounds), draws);
     }
+}
+
+/// llvmpipe ends loops after 65,535 iterations of an invocation, nested ones counted: what a draw does is bounded in one
+/// dispatch, and goes on in the next.
+#[test]
+fn models_whose_loops_are_long() {
+    for components in [33, 40, 64] {
+        let model = reflectances(&[BuiltinTable::Munsell, BuiltinTable::Vrhel], "400:1:700", components);
+        assert_twins(&Case::plain(&model), Stream::new(14).draws(0..2000));
+        assert_twins(&Case::new(&model, Some((0.6, Bounds::Both)), 1.0), Stream::new(14).draws(0..1000));
+    }
+    // As many components as bands: the cosines of a grid are orthonormal.
+    for size in [65, 200] {
+        let n = size as f64;
+        let basis = DMatrix::from_fn(size, size, |row, band| {
+            let scale = if row == 0 { (1.0 / n).sqrt() } else { (2.0 / n).sqrt() };
+            scale * (std::f64::consts::PI * row as f64 * (band as f64 + 0.5) / n).cos()
+        });
+        let model = Model::new(ModelParts {
+            grid: Grid::new(400.0, 0.5, size).expect("a grid"),
+            mean: DVector::from_element(size, 0.5),
+            basis,
+            weight_mean: DVector::zeros(size),
+            weight_covariance: DMatrix::identity(size, size) * 0.02,
+            explained_variance: vec![1.0 / n; size],
+            ..builtin("munsell-vrhel").parts().clone()
+        });
+        let case = Case::plain(&model.expect("it is a model"));
+        let rows = assert_twins(&case, Stream::new(15).draws(0..300));
+        assert!(rows.statuses.iter().any(|status| status.attempts() > 1));
+    }
+}
+
+/// A draw may take more candidates than one dispatch tries, on its own or beside others that take one.
+#[test]
+fn draws_of_very_many_attempts() {
+    let recipe = |attempts| {
+        let recipe = surfaces().lrv(0.98).bounds(Bounds::Scaled).proposal(ProposalKind::Plain);
+        recipe.max_attempts(attempts).build().expect("it can be drawn")
+    };
+    let mut most = 0;
+    for draws in [Stream::new(16).draws(0..2001), Stream::new(16).draws(0..1)] {
+        let recipe = recipe(300_000);
+        let (ours, theirs) = (rows(cpu(), &recipe, draws), rows(gpu(), &recipe, draws));
+        assert!(gpu().adapter().is_some_and(|adapter| adapter.kind != "software") || ours == theirs);
+        most = ours.statuses.iter().map(|status| status.attempts()).max().expect("there are draws").max(most);
+    }
+    println!("up to {most} attempts");
+    assert!(most > 65_535);
 }
 
 #[test]

@@ -14,6 +14,7 @@ use spectroll::{
 };
 
 use super::options::EngineArguments;
+use super::parse::between;
 use super::{interrupt, model};
 
 /// Duration of one run, seconds.
@@ -34,7 +35,8 @@ pub(crate) struct Arguments {
     #[arg(long, conflicts_with = "model")]
     costs: bool,
     /// Number of runs
-    #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(5..))]
+    #[arg(long, default_value_t = 7, value_parser = between::<5, 1_000_000>,
+          allow_negative_numbers = true)]
     runs: u32,
     /// Print the rates as JSON
     #[arg(long)]

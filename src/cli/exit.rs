@@ -1,5 +1,7 @@
 //! The errors of the program itself, and the exit code that each kind of error has.
 
+use std::io;
+
 use spectroll::export::{ExportError, SelectionError};
 use spectroll::output::OutputError;
 use spectroll::scene::SceneError;
@@ -93,10 +95,14 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             OutputError::Cannot { remedy, .. } if remedy.contains("quantity") => " (--quantities)",
             OutputError::Cannot { holds: "spectra", remedy: "choose spectra alone", .. } => " (--quantities)",
             OutputError::Cannot { holds: "one array" | "spectra", .. } => " (--arrays)",
-            OutputError::Cannot { holds: "f32 and f64", .. } => " (--dtype)",
+            OutputError::Cannot { holds: "f32 and f64" | "f32 alone, as text", .. } => " (--dtype)",
+            OutputError::Write { source, .. } => of_value(source),
             OutputError::NotBuilt { .. } => " (cargo build --features)",
             _ => "",
         };
+    }
+    if let Some(ExportError::Stdout(source)) = error.downcast_ref() {
+        return of_value(source);
     }
     if let Some(error) = error.downcast_ref::<RecipeError>() {
         return of_recipe(error);
@@ -121,6 +127,11 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
         _ if matches!(error.downcast_ref(), Some(EngineError::NoAdapters)) => " (--engine cpu)",
         _ => "",
     }
+}
+
+/// The option for a value that does not fit the type in which it was to be written.
+fn of_value(error: &io::Error) -> &'static str {
+    if error.kind() == io::ErrorKind::InvalidData { " (--dtype f32)" } else { "" }
 }
 
 fn of_recipe(error: &RecipeError) -> &'static str {

@@ -22,7 +22,8 @@ pub(crate) struct Arguments {
     #[arg(required = true, value_name = "FILE")]
     files: Vec<String>,
     /// The number of components, or the share of the variance that they must explain, as in 99.9%
-    #[arg(short = 'k', long, default_value = "6", value_name = "K", value_parser = components)]
+    #[arg(short = 'k', long, default_value = "6", value_name = "K", value_parser = components,
+          allow_hyphen_values = true)]
     components: Components,
     /// Kind of the spectra [default: as the name of the variable says: sur_X, spd_X, daylightX]
     #[arg(long, value_enum)]
@@ -31,7 +32,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "GRID")]
     wavelengths: Option<Grid>,
     /// Multiply the data by this: 0.01 makes reflectances of percentages
-    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", value_parser = factor)]
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", value_parser = factor,
+          allow_negative_numbers = true)]
     scale: f64,
     /// Divide each spectrum by this first [default: mean for illuminants, none for reflectances]
     #[arg(long, value_enum)]

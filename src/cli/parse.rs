@@ -40,13 +40,33 @@ fn whole(text: &str) -> Option<u64> {
     }
 }
 
+/// A whole number that is no count of things, as seeds are.
+pub(super) fn number(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| "expected a whole number from 0 to 2^64 - 1".to_owned())
+}
+
+/// A number of attempts. What is out of range is left to the recipe.
+pub(super) fn attempts(text: &str) -> Result<u32, String> {
+    let attempts = count(text).ok().and_then(|attempts| u32::try_from(attempts).ok());
+    attempts.ok_or_else(|| "expected a whole number from 1 to 2^31 - 1".to_owned())
+}
+
+/// A factor, whatever its sign.
+pub(super) fn factor(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "expected a number, as in 1.5".to_owned())
+}
+
+/// A whole number between two others.
+pub(super) fn between<const LOW: u64, const HIGH: u64>(text: &str) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|&number| (LOW..=HIGH).contains(&u64::from(number)));
+    number.ok_or_else(|| format!("expected a whole number from {LOW} to {HIGH}"))
+}
+
 /// A seed: a number, or `random` for one that the operating system draws. Parse it once: another time is another seed.
 pub(super) fn seed(text: &str) -> Result<u64, String> {
     match text {
         "random" => getrandom::u64().map_err(|e| format!("the operating system gives no random number: {e}")),
-        number => {
-            number.parse().map_err(|_| "expected a whole number from 0 to 2^64 - 1, or random".to_owned())
-        }
+        text => number(text).map_err(|expected| format!("{expected}, or random")),
     }
 }
 
@@ -116,6 +136,23 @@ mod tests {
         assert_eq!(counted(1, "spectrum", "spectra"), "1 spectrum");
         assert_eq!(counted(0, "spectrum", "spectra"), "0 spectra");
         assert_eq!(counted(2000, "spectrum", "spectra"), "2,000 spectra");
+    }
+
+    #[test]
+    fn numbers_say_what_they_take() {
+        assert_eq!(number("18446744073709551615"), Ok(u64::MAX));
+        assert_eq!(number("-1").unwrap_err(), "expected a whole number from 0 to 2^64 - 1");
+        assert_eq!((attempts("1e6"), between::<1, 22>("22")), (Ok(1_000_000), Ok(22)));
+        for text in ["-1", "many", "4294967296"] {
+            assert_eq!(attempts(text).unwrap_err(), "expected a whole number from 1 to 2^31 - 1");
+        }
+        for text in ["-1", "0", "23", "most"] {
+            assert_eq!(between::<1, 22>(text).unwrap_err(), "expected a whole number from 1 to 22");
+        }
+        assert_eq!(
+            (factor("-1"), factor("x").unwrap_err()),
+            (Ok(-1.0), "expected a number, as in 1.5".to_owned())
+        );
     }
 
     #[test]

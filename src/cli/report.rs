@@ -15,6 +15,7 @@ use spectroll::{EngineChoice, adapters};
 use super::exit::Usage;
 use super::interrupt::{self, Interrupted};
 use super::options::EngineArguments;
+use super::parse::number;
 use super::{if_exists, model};
 
 /// Measure error against run time, accuracy, randomness and extreme cases, as a page with plots
@@ -39,7 +40,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     peers: bool,
     /// The seed of all random numbers
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = number, allow_negative_numbers = true)]
     seed: u64,
     #[command(flatten)]
     engine: EngineArguments,

@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 use spectroll::export::{DrawExport, Output, Writing};
 use spectroll::output::SetStatus;
-use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Stream};
+use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Model, Stream};
 
 use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, Purpose, RecipeArguments};
@@ -87,10 +87,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = model_at(&arguments.model, arguments.wavelengths)?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
-    let stream = match &arguments.stream {
-        Some(name) => Stream::named(arguments.seed, name),
-        None => Stream::new(arguments.seed),
-    };
+    let unnamed = Stream::new(arguments.seed);
+    let stream = arguments.stream.as_ref().map_or(unnamed, |name| Stream::named(arguments.seed, name));
+    if let (true, Some(name)) = (stream == unnamed, &arguments.stream) {
+        let text = format!(
+            "--stream {name:?} has by its hash the draws of stream 0, as without --stream: choose another name"
+        );
+        return Err(Usage(text).into());
+    }
     let draws = DrawRange { stream, first: arguments.start, count: arguments.count };
     // A folder on this machine is nobody else's business.
     let name = Path::new(&arguments.model).file_name().unwrap_or_default().to_string_lossy();
@@ -122,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     report(
         arguments,
         &output,
-        outcome,
+        (&model, outcome),
         &Report {
             model: arguments.model.clone(),
             output: arguments.output.output.display().to_string(),
@@ -144,7 +148,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     )
 }
 
-fn report(arguments: &Arguments, output: &Output, outcome: SetStatus, made: &Report) -> anyhow::Result<()> {
+fn report(
+    arguments: &Arguments,
+    output: &Output,
+    (model, outcome): (&Model, SetStatus),
+    made: &Report,
+) -> anyhow::Result<()> {
     if arguments.json {
         writeln!(io::stdout(), "{}", serde_json::to_string_pretty(made)?)?;
     } else if !arguments.quiet {
@@ -156,6 +165,9 @@ fn report(arguments: &Arguments, output: &Output, outcome: SetStatus, made: &Rep
         tell!("{}: {kind}{spectra} of {}{above}", made.output, counted(made.bands as u64, "band", "bands"));
         let accepted = made.acceptance.map_or(String::new(), |a| format!(" ({:.4} % accepted)", 100.0 * a));
         tell!("  {}{accepted}, seed {}", counted(attempts, "candidate", "candidates"), made.seed);
+        if let Some(warning) = run::impossible_mean(model) {
+            tell!("  {warning}");
+        }
         let rate = match draws {
             ..100_000 => String::new(), // starting up is most of so short a run
             _ => format!("{:.2} million a second, ", made.draws_per_second / 1e6),

@@ -7,10 +7,10 @@ use std::time::Instant;
 
 use serde::Serialize;
 use spectroll::evaluation::plot::PictureFormat;
-use spectroll::export::{ArraySelection, Companions, ExportError, Output, SceneExport, Writing};
+use spectroll::export::{ArraySelection, Companions, ExportError, Output, SceneExport, Space, Writing};
 use spectroll::output::{OutputError, PendingFile, Schema, SetStatus};
 use spectroll::scene::{GroupSummary, PRESETS, Scene, Workload};
-use spectroll::{Engine, Quantity};
+use spectroll::{Dtype, Engine, Quantity};
 
 use super::exit::Usage;
 use super::interrupt;
@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     arrays: Vec<String>,
     /// Draw these scenes, B excluded [default: all]
-    #[arg(long, value_name = "A..B", value_parser = range)]
+    #[arg(long, value_name = "A..B", value_parser = range, allow_hyphen_values = true)]
     scenes: Option<Range<u64>>,
     #[command(flatten)]
     output: OutputArguments,
@@ -84,6 +84,18 @@ struct Report {
     scenes_per_second: f64,
     engine: String,
     version: &'static str,
+    /// Room on disk, in a dry run of what would be written.
+    #[serde(flatten)]
+    room: Option<Room>,
+}
+
+/// Room on disk, beside the bytes of the workload.
+#[derive(Serialize)]
+struct Room {
+    /// Number of bytes without which the run cannot end.
+    least: u64,
+    /// Number of bytes that are free; `None` where that cannot be told, or is of no account.
+    free: Option<u64>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -150,9 +162,16 @@ fn source(arguments: &Arguments) -> anyhow::Result<(String, String)> {
 
 /// `A..B`.
 fn range(text: &str) -> Result<Range<u64>, String> {
-    let parsed =
-        text.split_once("..").and_then(|(a, b)| Some(a.trim().parse().ok()?..b.trim().parse().ok()?));
-    parsed.filter(|range| range.start <= range.end).ok_or_else(|| "expected A..B, as in 0..100".to_owned())
+    let number = |text: &str| text.trim().parse::<u64>().ok();
+    let parsed = text.split_once("..").and_then(|(a, b)| Some(number(a)?..number(b)?));
+    match parsed {
+        Some(Range { start, end }) if start == end => Err(format!(
+            "there is no scene in it, for the end is left out; did you mean {start}..{}?",
+            end.saturating_add(1)
+        )),
+        Some(range) if range.start < range.end => Ok(range),
+        _ => Err("expected A..B, as in 0..100".to_owned()),
+    }
 }
 
 /// Scenes to be drawn.
@@ -176,6 +195,13 @@ impl Planned {
     /// Number of text files, where they make a folder.
     fn files(&self) -> Option<u64> {
         self.output.text_files(&self.schema, &self.companions)
+    }
+
+    /// Type in which an array is written, if it is.
+    fn dtype(&self, name: &str) -> Option<Dtype> {
+        let shared = self.schema.shared.iter().find(|shared| shared.name == name);
+        let field = self.schema.fields.iter().find(|field| field.name == name);
+        shared.map(|shared| shared.dtype).or(field.map(|field| field.stored))
     }
 
     fn check_space(&self) -> Result<(), OutputError> {
@@ -278,6 +304,11 @@ impl Job<'_> {
                 let above = above.map_or_else(String::new, |above| format!("; {above}"));
                 tell!("  {group}: {} drawn{accepted}{above}", counted(summary.draws, "spectrum", "spectra"));
             }
+            for (group, model) in self.scene.models() {
+                if let Some(warning) = run::impossible_mean(model) {
+                    tell!("  {group}: {warning}");
+                }
+            }
             self.tell_seed();
             tell!("  {seconds:.2} s, {}", report.engine);
             if let Some(status) = run::status(output, outcome) {
@@ -317,11 +348,17 @@ impl Job<'_> {
             scenes_per_second: 0.0,
             engine: engine.to_string(),
             version: env!("CARGO_PKG_VERSION"),
+            room: None,
         }
     }
 
     fn dry_run(&self, engine: &Engine, planned: Option<&Planned>) -> anyhow::Result<()> {
-        let report = Report { files: planned.and_then(Planned::files), ..self.workload(engine) };
+        let mut report = Report { files: planned.and_then(Planned::files), ..self.workload(engine) };
+        if let Some(Planned { output, schema, companions }) = planned {
+            let Space { bytes, least, free } = output.space(schema, companions);
+            report.workload.bytes = bytes;
+            report.room = Some(Room { least, free });
+        }
         if self.arguments.json {
             writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
         } else {
@@ -339,6 +376,10 @@ impl Job<'_> {
             let by = match (group.shader, group.draws_per_scene, group.draws_once) {
                 (_, 0, 0) => "nothing drawn".to_owned(),
                 (_, 0, once) => format!("{} drawn once, on the CPU", grouped(once)),
+                (_, each, _) if group.scenes_per_round > 1 => {
+                    let (each, round) = (grouped(each), grouped(group.scenes_per_round));
+                    format!("{each} for each {round} scenes, on the CPU")
+                }
                 (Some(shader), each, _) if workload.shaders > 0 => {
                     format!("{} a scene, by shader {shader}", grouped(each))
                 }
@@ -348,7 +389,8 @@ impl Job<'_> {
             for array in &group.arrays {
                 let scenes = array.per_scene.then_some(self.count() as usize);
                 let shape: Vec<_> = scenes.into_iter().chain(array.shape.iter().copied()).collect();
-                writeln!(out, "    {}: {shape:?} {}", array.name, array.dtype().name())?;
+                let dtype = planned.and_then(|planned| planned.dtype(&array.name)).unwrap_or(array.dtype());
+                writeln!(out, "    {}: {shape:?} {}", array.name, dtype.name())?;
             }
         }
         writeln!(out, "  left out:")?;

@@ -26,7 +26,8 @@ pub(crate) struct VerifyArguments {
     #[arg(value_name = "PATH")]
     path: PathBuf,
     /// The share of the chunks that is drawn again and compared, 0 to 1
-    #[arg(long, default_value_t = 0.01, value_name = "SHARE", value_parser = share)]
+    #[arg(long, default_value_t = 0.01, value_name = "SHARE", value_parser = share,
+          allow_negative_numbers = true)]
     redraw: f64,
     /// Folder of the files that a scene names [default: the folder that holds the set]
     #[arg(long, value_name = "FOLDER")]
@@ -207,7 +208,7 @@ impl Made {
         let engine = self.engine(arguments, schema)?;
         let mut differences = Vec::new();
         if let Made::Scenes { scene, first } = self {
-            let constants = SceneRows::new(scene, &engine, schema, *first)?.shared(&schema.shared);
+            let constants = SceneRows::new(scene, &engine, schema, *first)?.shared(&schema.shared)?;
             differences.extend(audit.shared_difference(constants)?);
         }
         let mut source = self.source(&engine, schema)?;

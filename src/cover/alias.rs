@@ -51,6 +51,30 @@ impl Alias {
     }
 }
 
+#[cfg(test)]
+impl Alias {
+    /// Number of all 2^32 words that choose each column, by choosing: in each column the words below a threshold
+    /// choose one number, and all others another.
+    pub(super) fn shares(&self) -> Vec<u64> {
+        let room = 1u64 << (32 - self.bits);
+        let mut shares = vec![0; self.columns.len()];
+        for column in 0..self.columns.len() as u64 {
+            let choose = |word: u64| self.choose((column * room + word) as u32);
+            let (mut low, mut high) = (0, room); // the threshold is between the two
+            while low < high {
+                let middle = (low + high) / 2;
+                if choose(middle) == column as u32 { low = middle + 1 } else { high = middle }
+            }
+            shares[column as usize] += low;
+            if low < room {
+                shares[choose(room - 1) as usize] += room - low;
+                assert_eq!(choose(low), choose(room - 1));
+            }
+        }
+        shares
+    }
+}
+
 /// Returns odds that sum to 2^32, in proportion to weights: rounded up, so that nothing is left out, and the factor
 /// of at least 1 by which rounding raised each. The last number is the odds that a weight of 1 would have got.
 pub(super) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
@@ -69,18 +93,6 @@ pub(super) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
 mod tests {
     use super::*;
 
-    /// Number of all words that choose each column.
-    fn shares(alias: &Alias) -> Vec<u64> {
-        let room = 1u64 << (32 - alias.bits);
-        let mut shares = vec![0; alias.columns.len()];
-        for (own, column) in alias.columns.iter().enumerate() {
-            let kept = u64::from(column.threshold >> alias.bits);
-            shares[own] += kept;
-            shares[column.alias as usize] += room - kept;
-        }
-        shares
-    }
-
     #[test]
     fn every_choice_has_exactly_its_odds() {
         for count in [2, 3, 4, 5, 1000, 1023, 1024] {
@@ -94,7 +106,7 @@ mod tests {
                         && (f64::from(odds) / excess / unit / weight - 1.0).abs() < 1e-12
                 );
             }
-            let shares = shares(&Alias::new(&odds));
+            let shares = Alias::new(&odds).shares();
             assert!(
                 shares.iter().zip(odds.iter().chain(std::iter::repeat(&0))).all(|(&s, &o)| s == u64::from(o))
             );

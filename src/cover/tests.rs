@@ -77,6 +77,94 @@ fn probabilities_are_those_of_other_methods() {
     }
 }
 
+/// Integral of a density from `low` to `high`, by Simpson's rule.
+fn integral(low: f64, high: f64, density: impl Fn(f64) -> f64) -> f64 {
+    const STEPS: u32 = 8000;
+    let width = (high - low) / f64::from(STEPS);
+    let term = |i: u32| {
+        let factor = if i == 0 || i == STEPS { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
+        factor * density(low + f64::from(i) * width)
+    };
+    width / 3.0 * (0..=STEPS).map(term).sum::<f64>()
+}
+
+/// The mass of an axis by its numbers alone: of the normal that it draws, or of the exponential above it.
+fn mass(numbers: [f64; 4], low: f64, high: f64) -> f64 {
+    let root = std::f64::consts::TAU.sqrt();
+    match numbers[2] < 0.0 {
+        true => {
+            let slope = -1.0 / numbers[1];
+            integral(low, high, |y| (slope * slope / 2.0 - slope * y).exp() / root)
+        }
+        false => {
+            let mass = integral(low, high, |y| (-y * y / 2.0).exp() / root);
+            assert!((mass / numbers[2] - 1.0).abs() < 1e-9, "{mass} {numbers:?}");
+            mass
+        }
+    }
+}
+
+/// Sampling cannot see an error of a thousandth in the odds of a box; integrals can.
+#[test]
+fn every_box_is_proposed_as_often_as_it_has_mass() {
+    for (lrv, scale) in [(Some(0.95), 1.0), (Some(0.99), 1.0), (None, 25.0), (None, 1e6)] {
+        let cover = cover_of(&program(lrv, scale), BOXES);
+        let (proposal, k) = (cover.proposal(), cover.proposal().components);
+        let shares = proposal.alias.shares();
+        assert_eq!(shares.iter().sum::<u64>(), 1 << 32);
+        let mut worst = 0f64;
+        for (i, sides) in cover.boxes.iter().enumerate() {
+            let axes = (0..k).map(|j| mass(proposal.axes[i * k + j], sides.low[j], sides.high[j]));
+            let wanted: f64 = axes.product();
+            // The share of words, thinned by the cost that a candidate of the box has before its axes are drawn.
+            let found = cover.mass() * shares[i] as f64 / 2f64.powi(32) * (-proposal.costs[i] / 2.0).exp();
+            // Both to 10^-9; and words come one at a time.
+            let error = (found - wanted).abs() - 2f64.powi(-32) * cover.mass();
+            let cost = proposal.costs[i];
+            assert!(
+                cost > -1e-12 && error < 1e-9 * wanted,
+                "box {i}: {found:e} for {wanted:e}, cost {cost:e}"
+            );
+            worst = worst.max((found / wanted - 1.0).abs());
+        }
+        println!("LRV {lrv:?}, covariance x{scale}: odds of {} boxes to {worst:.1e}", cover.len());
+        assert!(shares[cover.len()..].iter().all(|&share| share == 0));
+    }
+}
+
+/// Of the words of a candidate the first chooses the box, one each draws an axis, and the last thins: a word that
+/// served two of these would make them depend on each other.
+#[test]
+fn no_word_serves_two_choices() {
+    let cover = near_white();
+    let (proposal, k) = (cover.proposal(), cover.proposal().components);
+    let propose = |words: &[[u32; 4]]| {
+        let mut coordinates = vec![[0.0]; k];
+        let [kept] = proposal.propose(&mut coordinates, |block: u32| words[block as usize]);
+        (coordinates, kept)
+    };
+    let mut seen = vec![[false; 2]; 4 * proposal.blocks() as usize];
+    for i in 0..3000 {
+        let words: Vec<_> = (0..proposal.blocks()).map(|block| Stream::new(9).block(i, 0, block)).collect();
+        let (point, kept) = propose(&words);
+        for (word, seen) in seen.iter_mut().enumerate().skip(1) {
+            let mut changed = words.clone();
+            changed[word / 4][word % 4] ^= 0xA5A5_5A5A;
+            let (other, other_kept) = propose(&changed);
+            let moved: Vec<_> = (0..k).filter(|&axis| other[axis] != point[axis]).collect();
+            // In an axis as narrow as a rounding error, nothing moves.
+            let may_move: &[usize] = if word <= k { &[word - 1] } else { &[] };
+            assert!(moved.iter().all(|axis| may_move.contains(axis)), "word {word} moves {moved:?}");
+            *seen = [seen[0] | !moved.is_empty(), seen[1] | (kept != other_kept)];
+        }
+    }
+    // Every axis moves by its word, and the last word alone, with the axes, says whether a candidate stays.
+    for (word, [moves, thins]) in seen.into_iter().enumerate().skip(1) {
+        assert_eq!(moves, word <= k, "word {word}");
+        assert!(word <= k || thins == (word == k + 1), "word {word}");
+    }
+}
+
 /// Whether the spectrum of a point is accepted, in either arithmetic, as src/cpu computes it.
 fn is_physical<R: Real>(program: &Program, z: &[R]) -> bool {
     let spectrum: Vec<R> = (0..program.bands())

@@ -8,6 +8,7 @@ use wgpu::{BufferUsages, Features, PollType};
 
 use super::schedule::{Job, Pace, Window};
 use super::{Adapter, Batch, EngineError};
+use crate::quantity::Quantity;
 use crate::random::stream::DrawRange;
 use crate::sampler::{Prepared, Sampler};
 
@@ -94,6 +95,10 @@ impl Gpu {
         polled.map(drop).map_err(|e| self.error(e.to_string()))
     }
 
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("spectroll") })
+    }
+
     fn error(&self, reason: String) -> EngineError {
         EngineError::Gpu { adapter: self.adapter.to_string(), reason }
     }
@@ -155,8 +160,12 @@ impl<'a> GpuSchedule<'a> {
                 flying.push_back((window, slot.submit(self.gpu, parts)));
                 offset += window.steps;
             }
-            let Some((window, flight)) = flying.pop_front() else { return Ok(()) };
-            let waited = self.gpu.land(&flight)?;
+            let Some((window, mut flight)) = flying.pop_front() else { return Ok(()) };
+            let mut waited = self.gpu.land(&flight)?;
+            while flight.is_unfinished() {
+                flight = flight.resume(self.gpu);
+                waited |= self.gpu.land(&flight)?;
+            }
             // A window that was not waited for says nothing of the device, but that the caller sets the pace; the
             // first says how long the shader took to compile, and the last is but a remainder.
             let is_last = flying.is_empty() && offset == steps;
@@ -197,6 +206,8 @@ struct Flight {
     /// Draws of each job.
     draws: Vec<DrawRange>,
     submission: wgpu::SubmissionIndex,
+    /// Number of slices of each job that were submitted.
+    slices: u32,
     /// Result of mapping each buffer.
     mapped: Vec<Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>>,
 }
@@ -222,12 +233,16 @@ impl Slot {
     }
 
     fn submit(mut self, gpu: &Gpu, draws: Vec<DrawRange>) -> Flight {
-        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("spectroll") };
-        let mut encoder = gpu.device.create_command_encoder(&descriptor);
+        let mut encoder = gpu.encoder();
         for (prepared, draws) in self.prepared.iter_mut().zip(&draws) {
             prepared.set_draws(&gpu.queue, *draws).expect("a window has no more steps than a slot");
-            prepared.record(&mut encoder);
+            prepared.record_first(&mut encoder);
         }
+        self.fly(gpu, encoder, draws, 1)
+    }
+
+    /// Submits what was recorded, and asks for the buffers.
+    fn fly(self, gpu: &Gpu, mut encoder: wgpu::CommandEncoder, draws: Vec<DrawRange>, slices: u32) -> Flight {
         let drawn = self.prepared.iter().flat_map(Prepared::buffers);
         for (from, to) in drawn.zip(self.staging.iter().flatten()) {
             encoder.copy_buffer_to_buffer(from, 0, to, 0, None);
@@ -240,7 +255,7 @@ impl Slot {
             state
         };
         let mapped = self.readable().map(map).collect();
-        Flight { slot: self, draws, submission, mapped }
+        Flight { slot: self, draws, submission, slices, mapped }
     }
 
     /// The buffers that the host maps.
@@ -256,6 +271,29 @@ impl Flight {
     /// Result of mapping all buffers; `None` as long as one is open.
     fn state(&self) -> Option<Result<(), wgpu::BufferAsyncError>> {
         self.mapped.iter().map(|state| state.get().cloned()).collect()
+    }
+
+    /// Whether a draw of a window that has landed has found no candidate yet, and may take more.
+    fn is_unfinished(&self) -> bool {
+        let mut buffers = self.slot.readable();
+        self.slot.prepared.iter().zip(&self.draws).any(|(prepared, draws)| {
+            let arrays: Vec<_> = buffers.by_ref().take(prepared.formats().len()).collect();
+            let status = prepared.formats().iter().position(|f| f.quantity == Quantity::Attempts);
+            prepared.slices() > self.slices && {
+                let view = arrays[status.expect("an engine asks for it")].get_mapped_range(..);
+                let view = view.expect("it has landed");
+                bytemuck::cast_slice(&view[..4 * draws.count as usize]).iter().any(|&word: &u32| word == 0)
+            }
+        })
+    }
+
+    /// Submits the next slice of each job that has one.
+    fn resume(self, gpu: &Gpu) -> Flight {
+        self.slot.readable().for_each(wgpu::Buffer::unmap);
+        let mut encoder = gpu.encoder();
+        let jobs = self.slot.prepared.iter().filter(|prepared| prepared.slices() > self.slices);
+        jobs.for_each(|prepared| prepared.record_next(&mut encoder));
+        self.slot.fly(gpu, encoder, self.draws, self.slices + 1)
     }
 
     /// Hands a window that has landed to `sink`.

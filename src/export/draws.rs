@@ -1,6 +1,7 @@
 //! Draws of a recipe as a data set: a row per draw, its quantities as columns.
 
 use std::borrow::Cow;
+use std::io;
 use std::ops::{ControlFlow, Range};
 
 use serde_json::{Map, Value, json};
@@ -152,8 +153,8 @@ impl Rows for DrawRows<'_> {
         Ok(())
     }
 
-    fn shared(&self, _: &[SharedArray]) -> Vec<SharedArray> {
-        Vec::new()
+    fn shared(&self, _: &[SharedArray]) -> io::Result<Vec<SharedArray>> {
+        Ok(Vec::new())
     }
 }
 

@@ -26,6 +26,7 @@ mod scenes;
 mod space;
 mod writing;
 
+use std::io;
 use std::ops::Range;
 
 pub use draws::{DrawExport, DrawRows};
@@ -46,8 +47,9 @@ pub trait Rows {
     /// with the number of rows. The first error ends it.
     fn draw(&mut self, rows: Range<u64>, window: &mut Window) -> Result<(), ExportError>;
 
-    /// The values of the arrays that all rows share, in the order of their descriptions.
-    fn shared(&self, described: &[SharedArray]) -> Vec<SharedArray>;
+    /// The values of the arrays that all rows share, in the order of their descriptions and in the types that these say.
+    /// An error names a value that does not fit its type.
+    fn shared(&self, described: &[SharedArray]) -> io::Result<Vec<SharedArray>>;
 }
 
 /// Takes the columns of some rows, and their number.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::io;
 use std::ops::{ControlFlow, Range};
 
 use serde::{Deserialize, Serialize};
@@ -111,7 +112,7 @@ impl<'a> SceneExport<'a> {
                 .map(|array| field(array).stored_as(output.stored(array.quantity)))
                 .collect(),
             row: "scene".to_owned(),
-            shared: shared.into_iter().map(description).collect(),
+            shared: shared.into_iter().map(|array| description(array, output)).collect(),
             count: self.scenes.end - self.scenes.start,
             wavelengths: self.scene.grid().wavelengths().collect(),
             attributes: self.attributes(),
@@ -259,21 +260,26 @@ impl Rows for SceneRows<'_> {
         Ok(())
     }
 
-    fn shared(&self, described: &[SharedArray]) -> Vec<SharedArray> {
+    fn shared(&self, described: &[SharedArray]) -> io::Result<Vec<SharedArray>> {
         let drawn = self.session.constants();
-        let bytes = |name: &str| drawn.iter().find(|(array, _)| array.name == name);
-        let filled = |array: &SharedArray| {
-            let bytes = bytes(&array.name).map_or_else(Vec::new, |(_, bytes)| bytes.clone());
-            SharedArray { bytes, ..array.clone() }
+        let filled = |shared: &SharedArray| {
+            let found = drawn.iter().find(|(array, _)| array.name == shared.name);
+            let bytes = match found {
+                Some((array, bytes)) => field(array).stored_as(shared.dtype).store(bytes)?.into_owned(),
+                None => Vec::new(),
+            };
+            Ok(SharedArray { bytes, ..shared.clone() })
         };
         described.iter().map(filled).collect()
     }
 }
 
-fn description(array: &Array) -> SharedArray {
+/// Description of an array that all scenes share, in the type in which it is written.
+fn description(array: &Array, output: &Output) -> SharedArray {
     let extents = array.shape.iter().map(|&extent| extent as u64);
     let axes = axes(array).into_iter().zip(extents).collect();
-    SharedArray { name: array.name.clone(), axes, dtype: array.dtype(), bytes: Vec::new() }
+    let dtype = field(array).stored_as(output.stored(array.quantity)).stored;
+    SharedArray { name: array.name.clone(), axes, dtype, bytes: Vec::new() }
 }
 
 /// The names of the dimensions of an entry of an array.

@@ -69,8 +69,9 @@ impl Writing {
         engine: &Engine,
         rows: &mut dyn Rows,
     ) -> Result<Writing, ExportError> {
-        schema.shared = rows.shared(&schema.shared);
         let (path, if_exists) = (output.path(), output.if_exists());
+        let failed = |source| OutputError::Write { path: path.to_owned(), source };
+        schema.shared = rows.shared(&schema.shared).map_err(failed)?;
         if matches!(output.destination, Destination::Set(_)) {
             schema.attributes.insert("rounding".to_owned(), rows.rounding()?.into());
         }

@@ -210,6 +210,52 @@ mod tests {
     use crate::grid::Extrapolation;
 
     #[test]
+    fn spectra_are_divided_by_what_was_asked_for() {
+        let grid = Grid::new(400.0, 10.0, 3).unwrap();
+        let spectra = [[1.0, 2.0, 6.0], [2.0, 2.0, 2.0], [4.0, 1.0, 1.0]];
+        let table = Table::new("three", grid.wavelengths().collect(), &spectra.map(|s| s.to_vec())).unwrap();
+        let data = Dataset::new(&[table], grid, Extrapolation::Error).unwrap();
+        for (normalization, first, powers) in [
+            (Normalization::Mean, [1.0 / 3.0, 2.0 / 3.0, 2.0], vec![3.0, 2.0, 2.0]),
+            (Normalization::Integral, [1.0 / 90.0, 2.0 / 90.0, 6.0 / 90.0], vec![90.0, 60.0, 60.0]),
+            (Normalization::None, [1.0, 2.0, 6.0], vec![]),
+        ] {
+            let (divided, found) = normalization.divide(&data).unwrap();
+            assert_eq!(found, powers);
+            assert!(divided.column(0).iter().zip(first).all(|(a, b)| (a - b).abs() < 1e-15), "{divided}");
+            let fit = Fit::new(SpectrumKind::Illuminant).components(1).normalization(normalization);
+            assert_eq!(fit.fit(&data).unwrap().parts().powers, powers);
+        }
+        let unasked = Fit::new(SpectrumKind::Illuminant).components(1).fit(&data).unwrap();
+        assert_eq!(unasked.parts().normalization, Normalization::Mean);
+        let unasked = Fit::new(SpectrumKind::Reflectance).components(1).fit(&data);
+        assert!(
+            matches!(unasked, Err(FitError::NotReflectances { mean }) if (mean - 7.0 / 3.0).abs() < 1e-15)
+        );
+    }
+
+    /// A direction counts if its singular value is above max(bands, spectra) x epsilon x the largest, as in NumPy.
+    #[test]
+    fn a_direction_counts_from_the_tolerance_on() {
+        let rank = |size: f64| {
+            let spectra: Vec<_> = (0..8u32)
+                .map(|i| {
+                    let sign = |bit: u32| if i >> bit & 1 == 0 { 1.0 } else { -1.0 };
+                    vec![0.25 * sign(0), 0.25 * sign(0), size * sign(1), 0.0]
+                })
+                .collect();
+            let grid = Grid::new(400.0, 10.0, 4).unwrap();
+            let table = Table::new("signs", grid.wavelengths().collect(), &spectra).unwrap();
+            let data = Dataset::new(&[table], grid, Extrapolation::Error).unwrap();
+            Fit::new(SpectrumKind::Reflectance).components(2).fit(&data).map(|model| model.components())
+        };
+        // Singular values are sqrt(8) x the sizes of the directions, of which the first has sqrt(2) / 4.
+        let tolerance = 8.0 * f64::EPSILON * 2f64.sqrt() / 4.0;
+        assert_eq!(rank(1.5 * tolerance), Ok(2));
+        assert_eq!(rank(0.5 * tolerance), Err(FitError::Rank { components: 2, rank: 1 }));
+    }
+
+    #[test]
     fn percents_are_no_reflectances() {
         let percents: Vec<_> =
             (0..9).map(|i| vec![40.0 + f64::from(i), 50.0, 60.0 - f64::from(i * i)]).collect();

@@ -220,6 +220,19 @@ impl Model {
         &self.parts.mean + self.parts.basis.transpose() * DVector::from_column_slice(weights)
     }
 
+    /// The wavelength and the value of the mean spectrum where that is furthest from what spectra can be: below 0 or, of
+    /// reflectances, above 1. `None` where it is neither. Draws, which keep to these bounds, have another mean than such a
+    /// model.
+    pub fn impossible_mean(&self) -> Option<(f64, f64)> {
+        let mean = self.reconstruct(self.parts.weight_mean.as_slice());
+        let most = if self.parts.kind == SpectrumKind::Reflectance { 1.0 } else { f64::INFINITY };
+        let excess = |value: f64| (-value).max(value - most);
+        let (band, &value) =
+            mean.iter().enumerate().max_by(|(_, a), (_, b)| excess(**a).total_cmp(&excess(**b)))?;
+        // A mean of zeros may be a little below after rounding.
+        (excess(value) > 1e-9 * mean.amax()).then(|| (self.parts.grid.wavelength(band), value))
+    }
+
     /// The factor that turns k standard normals into centred weights: a square root of the covariance. Diagonal where
     /// the covariance is; else the symmetric root, which exists where a Cholesky factor does not (deficient rank).
     pub fn weight_factor(&self) -> DMatrix<f64> {

@@ -28,10 +28,13 @@ impl<W: Write> Csv<W> {
 impl<W: Write> Encoder for Csv<W> {
     fn write(&mut self, columns: &[&[u8]]) -> io::Result<()> {
         self.text.clear();
-        for row in 0..self.schema.rows(columns) {
-            for (field, column) in self.schema.fields.iter().zip(columns) {
-                let size = field.delivered_bytes();
-                for value in field.values(&column[row * size..(row + 1) * size]) {
+        let rows = self.schema.rows(columns);
+        let columns = self.schema.fields.iter().zip(columns).map(|(field, column)| field.store(column));
+        let columns = columns.collect::<io::Result<Vec<_>>>()?;
+        for row in 0..rows {
+            for (field, column) in self.schema.fields.iter().zip(&columns) {
+                let size = field.stored_bytes();
+                for value in field.stored_values(&column[row * size..(row + 1) * size]) {
                     push(&mut self.text, field.stored, value);
                     self.text.push(',');
                 }
@@ -65,7 +68,7 @@ fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
     match field.axis.as_deref() {
         Some("wavelength") => wavelengths.iter().map(f64::to_string).collect(),
         Some(_) if field.channels.len() == field.width => field.channels.clone(),
-        Some(_) => (1..=field.width).map(|i| format!("{}_{i}", field.name)).collect(),
+        Some(_) => (0..field.width).map(|i| format!("{}_{i}", field.name)).collect(),
         None => vec![field.name.clone()],
     }
 }
@@ -74,9 +77,8 @@ fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
 fn push(text: &mut String, dtype: Dtype, value: f64) {
     match dtype {
         Dtype::F64 | Dtype::U32 => write!(text, "{value}"),
-        Dtype::F32 => write!(text, "{}", value as f32),
-        // Its own shortest form would be ambiguous to those who read it as anything else.
-        Dtype::F16 => write!(text, "{}", half::f16::from_f64(value).to_f32()),
+        // The shortest form of a half would be ambiguous to those who read it as anything else.
+        Dtype::F32 | Dtype::F16 => write!(text, "{}", value as f32),
     }
     .expect("a string takes it all");
 }

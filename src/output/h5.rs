@@ -73,12 +73,16 @@ pub(super) fn constant(file: &H5File, constant: &SharedArray) -> Result<H5Datase
         Dtype::F32 => file.new_dataset::<f32>().shape(shape).create(&constant.name)?,
         Dtype::F64 => file.new_dataset::<f64>().shape(shape).create(&constant.name)?,
         Dtype::U32 => file.new_dataset::<u32>().shape(shape).create(&constant.name)?,
-        Dtype::F16 => unreachable!("what draws share is kept as it was drawn"),
+        Dtype::F16 => {
+            let f16 = DatatypeMessage::f16_type();
+            file.new_dataset::<u16>().datatype(f16).shape(shape).create(&constant.name)?
+        }
     };
     match constant.dtype {
         Dtype::F32 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f32>(&constant.bytes))?,
         Dtype::F64 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, f64>(&constant.bytes))?,
-        _ => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, u32>(&constant.bytes))?,
+        Dtype::F16 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, u16>(&constant.bytes))?,
+        Dtype::U32 => set.write_raw(&bytemuck::pod_collect_to_vec::<u8, u32>(&constant.bytes))?,
     }
     Ok(set)
 }

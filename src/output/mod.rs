@@ -164,7 +164,10 @@ impl FileFormat {
         }
         let one = schema.fields.len() == 1;
         let shares = !schema.shared.is_empty();
-        let halves = schema.fields.iter().any(|field| field.stored == Dtype::F16);
+        let fields = schema.fields.iter().map(|field| field.stored);
+        let mut dtypes = fields.chain(schema.shared.iter().map(|shared| shared.dtype));
+        let halves = dtypes.clone().any(|dtype| dtype == Dtype::F16);
+        let singles = dtypes.all(|dtype| matches!(dtype, Dtype::F32 | Dtype::U32));
         let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
         let of_scenes = schema.row == "scene";
         match self {
@@ -183,6 +186,7 @@ impl FileFormat {
                 let scene = "choose the spectra of one group or more";
                 cannot(".spd", "spectra", if of_scenes { scene } else { "choose spectra alone" })
             }
+            FileFormat::Spd if !singles => cannot(".spd", "f32 alone, as text", "leave out the type"),
             FileFormat::Mat if !mat::has_names(schema, spectra) => {
                 cannot(".mat", "names of up to 63 letters, digits and _, each once", "rename the group")
             }
@@ -343,5 +347,15 @@ mod tests {
         let halves = schema(&[&spectra.clone().stored_as(Dtype::F16)]);
         assert_eq!(error(FileFormat::Npy, &halves), "");
         assert!(error(FileFormat::Mat, &halves).contains("f32 and f64"));
+        let shared = SharedArray {
+            name: "spectra".to_owned(),
+            axes: vec![("number".to_owned(), 1), ("wavelength".to_owned(), 31)],
+            dtype: Dtype::F16,
+            bytes: Vec::new(),
+        };
+        let shares = Schema { shared: vec![shared], ..schema(&[&lrv]) };
+        assert!(error(FileFormat::Mat, &shares).contains("f32 and f64"));
+        let doubles = schema(&[&spectra.clone().stored_as(Dtype::F64)]);
+        assert!(error(FileFormat::Spd, &doubles).contains("hold f32 alone"));
     }
 }

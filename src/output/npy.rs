@@ -1,8 +1,6 @@
-//! NumPy's `.npy`: one array, C order. The `npyz` crate writes the header; the bytes of the draws follow unchanged.
+//! NumPy's `.npy`: one array, C order: a header, after which the bytes of the draws follow unchanged.
 
 use std::io::{self, Write};
-
-use npyz::WriterBuilder;
 
 use super::Encoder;
 use super::schema::{Field, Schema};
@@ -16,7 +14,7 @@ pub(super) struct Npy<W> {
 impl<W: Write> Npy<W> {
     pub(super) fn begin(mut to: W, schema: &Schema) -> io::Result<Self> {
         let field = schema.only_field().clone();
-        to.write_all(&header(type_string(field.stored), &field.shape(schema.count))?)?;
+        to.write_all(&header(type_string(field.stored), &field.shape(schema.count)))?;
         Ok(Npy { to, field })
     }
 }
@@ -33,18 +31,18 @@ impl<W: Write> Encoder for Npy<W> {
 }
 
 /// The bytes of a whole small file.
-pub(super) fn file(dtype: &str, shape: &[u64], data: &[u8]) -> io::Result<Vec<u8>> {
-    let header = header(dtype, shape)?;
-    Ok([&header, data].concat())
+pub(super) fn file(dtype: &str, shape: &[u64], data: &[u8]) -> Vec<u8> {
+    [&header(dtype, shape), data].concat()
 }
 
-/// Bytes before the data of an array.
-pub(super) fn header(dtype: &str, shape: &[u64]) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let dtype = npyz::DType::Plain(dtype.parse().expect("it is one of NumPy's types"));
-    let options = npyz::WriteOptions::new_header_only();
-    options.dtype(dtype).shape(shape).writer(&mut bytes).write_header_only()?;
-    Ok(bytes)
+/// Bytes before the data of an array, a multiple of 64 (numpy.lib.format, version 1.0).
+pub(super) fn header(dtype: &str, shape: &[u64]) -> Vec<u8> {
+    let extents: String = shape.iter().map(|extent| format!("{extent}, ")).collect();
+    let text = format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': ({extents}), }}");
+    // Magic, version and length come before it, and a line feed ends it.
+    let length = (10 + text.len() + 1).next_multiple_of(64) - 10;
+    let size = u16::try_from(length).expect("few extents are short").to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &size[..], format!("{text:<0$}\n", length - 1).as_bytes()].concat()
 }
 
 /// Name of a type in NumPy's headers.

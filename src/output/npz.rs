@@ -36,26 +36,26 @@ impl<W: Write + Seek> Npz<W> {
     pub(super) fn begin(to: W, schema: &Schema) -> io::Result<Self> {
         let mut npz = Npz { to, schema: schema.clone(), entries: Vec::new(), end: 0 };
         for field in &schema.fields {
-            let header = npy::header(npy::type_string(field.stored), &field.shape(schema.count))?;
+            let header = npy::header(npy::type_string(field.stored), &field.shape(schema.count));
             npz.add(&field.name, &header, schema.count * field.stored_bytes() as u64)?;
         }
         let wavelengths: Vec<u8> = schema.wavelengths.iter().flat_map(|w| w.to_le_bytes()).collect();
-        let array = npy::file("<f8", &[schema.wavelengths.len() as u64], &wavelengths)?;
+        let array = npy::file("<f8", &[schema.wavelengths.len() as u64], &wavelengths);
         npz.add("wavelength", &array, 0)?;
         for constant in &schema.shared {
             let dtype = npy::type_string(constant.dtype);
-            npz.add(&constant.name, &npy::file(dtype, &constant.shape(), &constant.bytes)?, 0)?;
+            npz.add(&constant.name, &npy::file(dtype, &constant.shape(), &constant.bytes), 0)?;
         }
         let text: Vec<char> = schema.attributes_text().chars().collect();
         let utf32: Vec<u8> = text.iter().flat_map(|&c| u32::from(c).to_le_bytes()).collect();
-        npz.add("attributes", &npy::file(&format!("<U{}", text.len()), &[], &utf32)?, 0)?;
+        npz.add("attributes", &npy::file(&format!("<U{}", text.len()), &[], &utf32), 0)?;
         Ok(npz)
     }
 
     /// Adds an array that begins with `start` and has `rest` more bytes to come.
     fn add(&mut self, name: &str, start: &[u8], rest: u64) -> io::Result<()> {
         let mut entry = Entry {
-            name: npyz::npz::file_name_from_array_name(name),
+            name: format!("{name}.npy"),
             offset: self.end,
             next: 0,
             size: start.len() as u64 + rest,

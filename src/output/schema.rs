@@ -119,7 +119,7 @@ impl Field {
     }
 
     /// Converts delivered values to the type in which they are written. An error names the value that does not fit.
-    pub(super) fn store<'a>(&self, bytes: &'a [u8]) -> io::Result<Cow<'a, [u8]>> {
+    pub(crate) fn store<'a>(&self, bytes: &'a [u8]) -> io::Result<Cow<'a, [u8]>> {
         if self.dtype == self.stored {
             return Ok(Cow::Borrowed(bytes));
         }
@@ -127,8 +127,12 @@ impl Field {
         let mut out = Vec::with_capacity(values.len() * self.stored.size());
         match (self.dtype, self.stored) {
             (from, Dtype::F16) => {
-                for value in values.map(|v| read(from, v)) {
-                    out.extend_from_slice(&self.half(value)?.to_le_bytes());
+                for row in bytes.chunks_exact(self.inner_width() * self.dtype.size()) {
+                    let values = || row.chunks_exact(self.dtype.size()).map(|v| read(from, v));
+                    self.check_dim(values())?;
+                    for value in values() {
+                        out.extend_from_slice(&self.half(value)?.to_le_bytes());
+                    }
                 }
             }
             (from, Dtype::F32) => {
@@ -140,6 +144,26 @@ impl Field {
         Ok(Cow::Owned(out))
     }
 
+    /// Number of values of each of a draw's rows: of a spectrum, its bands.
+    fn inner_width(&self) -> usize {
+        self.width / self.outer.as_ref().map_or(1, |(_, count)| (*count).max(1))
+    }
+
+    /// Refuses values, of one spectrum say, of which even the largest is below the normal range of half precision. A
+    /// value that is small beside others of its spectrum is rounded there to 2^-25, or 1/2048 of a largest value that
+    /// passes, as any number in half precision is to 1/2048 of itself; but where all are as small, all lose their digits.
+    fn check_dim(&self, values: impl Iterator<Item = f64>) -> io::Result<()> {
+        let largest = values.fold(0.0, |a: f64, value| a.max(value.abs()));
+        if largest > 0.0 && largest < f16::MIN_POSITIVE.to_f64() {
+            let what = format!(
+                "{} of up to {largest:.1e} do not fit float16, which loses digits below 6.1e-5: use float32",
+                self.name
+            );
+            return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+        }
+        Ok(())
+    }
+
     fn half(&self, value: f64) -> io::Result<f16> {
         let [least, largest] = self.range.map_or([f32::NEG_INFINITY, f32::INFINITY], ValueRange::halves);
         let half = f16::from_f64(value.clamp(least.into(), largest.into()));
@@ -149,6 +173,12 @@ impl Field {
             return Err(io::Error::new(io::ErrorKind::InvalidData, what));
         }
         Ok(half)
+    }
+
+    /// Decodes bytes that [`store`](Field::store) made.
+    pub(super) fn stored_values<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = f64> + use<'a> {
+        let dtype = self.stored;
+        bytes.chunks_exact(dtype.size()).map(move |value| read(dtype, value))
     }
 
     /// Decodes delivered bytes.
@@ -165,7 +195,7 @@ pub struct SharedArray {
     pub name: String,
     /// Dimensions: their names and extents.
     pub axes: Vec<(String, u64)>,
-    /// Type of its values.
+    /// Type of its values, as they are written.
     #[serde(rename = "element")]
     pub dtype: Dtype,
     /// Values in C order. A set of chunks has them in a file of their own.
@@ -285,5 +315,28 @@ mod tests {
         assert_eq!(half.shape(5), [5, 2]);
         let attempts = Field::scalar("attempts", Dtype::U32).stored_as(Dtype::F16);
         assert_eq!((attempts.stored, attempts.shape(5)), (Dtype::U32, vec![5]));
+    }
+
+    #[test]
+    fn halves_hold_dim_bands_but_no_dim_spectra() {
+        let bytes = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        let field = Field::vector("spectra", "wavelength", 2, Dtype::F32).repeated("number", 2);
+        let field = field.stored_as(Dtype::F16).within(ValueRange::Positive);
+        let error = |values: &[f32]| field.store(&bytes(values)).map_err(|e| e.to_string()).err();
+        let least = f16::MIN_POSITIVE.to_f32();
+        assert_eq!(error(&[1e-12, least, 1e-30, 1.0]), None);
+        // A band that would be 0 is the smallest number above it.
+        let drawn = bytes(&[1e-12, least, 0.5, 1.0]);
+        let stored = field.store(&drawn).unwrap();
+        let stored: Vec<f64> = field.stored_values(&stored).collect();
+        assert_eq!(stored, [2f64.powi(-24), 2f64.powi(-14), 0.5, 1.0]);
+        // One of a draw's rows is as much lost as all of them.
+        let expected =
+            "spectra of up to 6.1e-5 do not fit float16, which loses digits below 6.1e-5: use float32";
+        assert_eq!(error(&[0.5, 0.5, 1e-5, f32::from_bits(least.to_bits() - 1)]).unwrap(), expected);
+        assert!(error(&[1e-9, 1.2e-9, 0.5, 0.5]).unwrap().starts_with("spectra of up to 1.2e-9 do not fit"));
+        // Nothing is lost of zeros.
+        assert_eq!(error(&[0.0; 4]), None);
+        assert!(error(&[1.0, 1.0, 1e5, 1.0]).unwrap().contains("ends at 65504"));
     }
 }

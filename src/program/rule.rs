@@ -63,6 +63,14 @@ impl LrvLaw {
         LrvLaw::Uniform { low, span: high - low, high }
     }
 
+    /// The smallest target.
+    pub(crate) fn least(&self) -> f64 {
+        match *self {
+            LrvLaw::Fixed(lrv) => lrv,
+            LrvLaw::Uniform { low, .. } => low,
+        }
+    }
+
     /// The largest target, which is the hardest to meet: a spectrum that is below 1 at one is below 1 at every lower.
     pub(crate) fn largest(&self) -> f64 {
         match *self {
@@ -79,4 +87,14 @@ pub(crate) enum IntensityLaw<R = f64> {
     LogUniform { low: R, octaves: R },
     /// One of these, each as likely.
     OneOf(Vec<R>),
+}
+
+impl IntensityLaw {
+    /// The smallest intensity.
+    pub(crate) fn least(&self) -> f64 {
+        match self {
+            IntensityLaw::LogUniform { low, .. } => *low,
+            IntensityLaw::OneOf(values) => values.iter().fold(f64::INFINITY, |a, &b| a.min(b)),
+        }
+    }
 }

@@ -61,6 +61,8 @@ impl RecipeBuilder {
 
     /// Sets the type of the spectra ([`Dtype::F32`]). In [`Dtype::F16`] they are rounded to nearest and ties to even,
     /// but never to an end of their [`ValueRange`]; above 65,504 they are infinite. Other quantities stay in 32 bits.
+    /// Where the mean spectrum at the smallest intensity or target is below 2^-14 in every band, so that spectra lose
+    /// digits in 16 bits, [`build`](RecipeBuilder::build) refuses.
     ///
     /// [`ValueRange`]: crate::ValueRange
     pub fn spectra_dtype(mut self, dtype: Dtype) -> Self {
@@ -198,6 +200,7 @@ impl RecipeBuilder {
         }
         check_scale(&program)?;
         program.outputs = outputs(&asked, &self.model, &program, &weights)?;
+        check_halves(&program)?;
         Ok(program)
     }
 
@@ -372,6 +375,22 @@ impl RecipeBuilder {
         let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
         Ok(LrvTarget { lrv, weights, bounds: self.bounds.unwrap_or_default() })
     }
+}
+
+/// Spectra in 16 bits must be in the normal range of these somewhere, at the smallest intensity or target.
+fn check_halves(program: &Program) -> Result<(), RecipeError> {
+    let has_halves = program.outputs.iter().any(|output| output.format.dtype == Dtype::F16);
+    let mean = &program.spectrum.offset;
+    let scale = match (&program.target, &program.intensity) {
+        (Some(target), _) => {
+            target.lrv.least() / target.weights.iter().zip(mean).map(|(w, s)| w * s).sum::<f64>()
+        }
+        (None, Some(intensity)) => intensity.least(),
+        (None, None) => 1.0,
+    };
+    let largest = mean.iter().fold(0.0, |a: f64, s| a.max(s.abs())) * scale.abs();
+    let is_dim = has_halves && largest < half::f16::MIN_POSITIVE.to_f64();
+    if is_dim { Err(RecipeError::DimHalves { largest }) } else { Ok(()) }
 }
 
 /// Numbers must survive rounding to f32, with room for sums and for a scale of 10^6 either way; where there is a

@@ -76,6 +76,11 @@ pub enum RecipeError {
     )]
     Scale { value: f64, low: f64, high: f64 },
     #[error(
+        "spectra of up to {largest:.1e} do not fit float16, which loses digits below 6.1e-5: ask for float32, or for \
+         brighter spectra"
+    )]
+    DimHalves { largest: f64 },
+    #[error(
         "no spectrum of this model can be accepted: the bounds at {} leave no room",
         nanometres(wavelengths)
     )]

@@ -28,8 +28,8 @@ use crate::random::real::Real;
 use crate::random::stream::Stream;
 use crate::wgsl::{self, WgslError};
 
-/// Default limit on the number of candidates of a draw.
-pub const DEFAULT_MAX_ATTEMPTS: u32 = 1 << 16;
+/// Default limit on the number of candidates of a draw: as many as any driver tries in one dispatch.
+pub const DEFAULT_MAX_ATTEMPTS: u32 = 65_000;
 
 /// A model with the settings of its draws. See [`Recipe::builder`].
 #[derive(Clone, Debug)]
@@ -263,6 +263,29 @@ mod tests {
 
     fn message(recipe: RecipeBuilder) -> String {
         recipe.build().unwrap_err().to_string()
+    }
+
+    /// The ends of a range, and the last of the data's powers, by the words that choose them.
+    #[test]
+    fn intensities_reach_both_of_their_ends() {
+        let model = Model::builtin("granada").unwrap();
+        let law = |intensity| {
+            let recipe = Recipe::builder(&model).intensity(intensity).build().unwrap();
+            recipe.program().intensity.clone().expect("it varies")
+        };
+        let range = law(Intensity::LogUniform(0.15, 150.0));
+        for (word, share) in [(0, 0.0), (1 << 30, 0.25), (1 << 31, 0.5), (u32::MAX, 1.0)] {
+            assert!((range.of(word) / (0.15 * 1000f64.powf(share)) - 1.0).abs() < 1e-8, "{word}");
+        }
+        let (powers, data) = (&model.parts().powers, law(Intensity::Data));
+        let count = powers.len() as u64;
+        assert_eq!(count, 2600);
+        for (i, &power) in powers.iter().enumerate() {
+            // The first and the last word that choose one of so many.
+            let first = ((i as u64) << 32).div_ceil(count);
+            let last = ((i as u64 + 1) << 32).div_ceil(count) - 1;
+            assert_eq!([first, last].map(|word| data.of(word as u32)), [power; 2], "{i}");
+        }
     }
 
     #[test]

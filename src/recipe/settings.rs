@@ -123,7 +123,7 @@ mod tests {
         let plain = serde_json::to_string(&RecipeSettings::default()).unwrap();
         assert_eq!(
             plain,
-            r#"{"lrv":null,"bounds":"base","cov_scale":1.0,"intensity":null,"quantities":["spectra"],"illuminant":"d65","xyz_scale":"absolute","proposal":"auto","max_attempts":65536}"#
+            r#"{"lrv":null,"bounds":"base","cov_scale":1.0,"intensity":null,"quantities":["spectra"],"illuminant":"d65","xyz_scale":"absolute","proposal":"auto","max_attempts":65000}"#
         );
         let other = RecipeSettings {
             lrv: Some(Lrv::Fixed(0.4)),

@@ -64,8 +64,13 @@ pub enum SceneErrorKind {
     SameName(String),
     #[error("the arrays of {0:?} and of this group would have one name: rename one of them")]
     SameArray(String),
-    #[error("{0:?} happens to give the same random numbers: rename one of the two")]
+    #[error("by its hash {0:?} has the same random numbers: rename one of the two groups")]
     SameStream(String),
+    #[error(
+        "{0:?} has by its hash the random numbers of stream 0, which are those of draws without a stream: use another \
+         name"
+    )]
+    StreamZero(String),
     #[error("{0} a scene: it takes 1 to {MAX_COUNT}; what needs more can be several groups")]
     Count(u64),
     #[error("{draws:.2e} draws in all: at most {MAX_DRAWS:.0e} fit into one data set, so draw fewer scenes")]
@@ -88,10 +93,23 @@ pub enum SceneErrorKind {
     MeanLength { found: usize, expected: usize },
     #[error("its mean power is {0}, and must be above 0: give the spectrum of a light")]
     DarkMean(f64),
+    #[error(
+        "its power at {wavelength} nm is {power}, and that of a light is never negative: raise it to 0 or leave mean out"
+    )]
+    NegativeMean { power: f64, wavelength: f64 },
     #[error("{0}: every level must be above 0 and below 1, where 1 is a perfect white")]
     Level(f64),
     #[error("{0} levels: it takes 1 to 10000")]
     Levels(u64),
+    #[error(
+        "1 level from {from} to {to} leaves out which of the two: write lrv = {from}, or 2 levels or more"
+    )]
+    OneLevel { from: f64, to: f64 },
+    #[error(
+        "luminous reflectances from {from} to {to}: {source}; or write a list of levels, as in lrv = {{ from = {from}, \
+         to = {to}, levels = 10 }}, for each of which another way to draw can be found"
+    )]
+    HopelessRange { from: f64, to: f64, source: RecipeError },
     #[error("from {from} to {to}: the first must be below the second")]
     Order { from: f64, to: f64 },
     #[error("{from} to {to}: {what} is between 0 and 1, and the first no more than the second")]

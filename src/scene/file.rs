@@ -21,6 +21,7 @@ use super::group::{
     Targets,
 };
 use super::reader::{Entry, Section, Wrong};
+use super::target::{FLAT_IS_NOT_DRAWN, bounds_without_lrv};
 use super::{Scene, SceneBuilder};
 use crate::suggestion::closest;
 
@@ -210,16 +211,14 @@ impl Reader<'_> {
                 return Err(section.wrong("lrv", SceneErrorKind::Missing { example }));
             }
         };
+        let mut of_draws = ["model", "cov_scale", "max_attempts"].into_iter().filter(|_| flat);
+        if let Some(entry) = of_draws.find_map(|key| section.get(key)) {
+            return Err(entry.wrong(SceneErrorKind::Pointless { with: FLAT_IS_NOT_DRAWN }));
+        }
         let base = self.base(section, Some((1, flat)))?;
         let bounds = section.get("bounds");
         if let Some(entry) = bounds.as_ref().filter(|_| !matches!(aim, TargetConstraint::Lrv(_))) {
-            let with = match aim {
-                TargetConstraint::Flat(_) => {
-                    "for a flat target, which is the same in every band and never out of bounds"
-                }
-                _ => "without an lrv: a spectrum of given tristimulus values is not scaled",
-            };
-            return Err(entry.wrong(SceneErrorKind::Pointless { with }));
+            return Err(entry.wrong(SceneErrorKind::Pointless { with: bounds_without_lrv(&aim) }));
         }
         let names = [("base", Bounds::Base), ("scaled", Bounds::Scaled), ("both", Bounds::Both)];
         let bounds = bounds.map_or(Ok(Bounds::default()), |entry| entry.choice(&names))?;
@@ -287,11 +286,18 @@ impl Reader<'_> {
             path => Table::open(&self.folder.join(path), None),
         };
         let wrong = |e: DatasetError| entry.wrong(SceneErrorKind::Mean(e));
-        let data = Dataset::new(&[table.map_err(wrong)?], grid, Extrapolation::Error).map_err(wrong)?;
-        match data.spectra().ncols() {
-            1 => Ok(data.spectra().column(0).iter().copied().collect()),
-            found => Err(entry.wrong(SceneErrorKind::Means { found })),
+        let tables = [table.map_err(wrong)?];
+        let data = Dataset::new(&tables, grid, Extrapolation::Error).map_err(wrong)?;
+        let found = data.spectra().ncols();
+        if found != 1 {
+            return Err(entry.wrong(SceneErrorKind::Means { found }));
         }
+        let mut measured = tables[0].wavelengths().iter().zip(tables[0].spectrum(0));
+        if let Some((&wavelength, &power)) = measured.find(|(_, power)| **power < 0.0) {
+            return Err(entry.wrong(SceneErrorKind::NegativeMean { power, wavelength }));
+        }
+        // A spline between zeros and a peak may dip below 0, which no light does.
+        Ok(data.spectra().column(0).iter().map(|power| power.max(0.0)).collect())
     }
 }
 
@@ -353,6 +359,9 @@ fn levels(entry: &Entry) -> Result<LrvLevels, Wrong> {
     let levels = count.whole()?;
     if !(1..=10_000).contains(&levels) {
         return Err(count.wrong(SceneErrorKind::Levels(levels)));
+    }
+    if levels == 1 && from != to {
+        return Err(count.wrong(SceneErrorKind::OneLevel { from, to }));
     }
     if levels > 1 && from >= to {
         return Err(entry.wrong(SceneErrorKind::Order { from, to }));

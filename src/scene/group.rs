@@ -117,7 +117,7 @@ pub enum Copies {
 }
 
 impl LrvLevels {
-    /// `levels` values at equal steps, `from` and `to` included.
+    /// `levels` values at equal steps, `from` and `to` included; one level is `from`.
     pub fn even(from: f64, to: f64, levels: u32) -> LrvLevels {
         let step = (to - from) / f64::from(levels.saturating_sub(1).max(1));
         LrvLevels::Each((0..levels).map(|level| from + step * f64::from(level)).collect())
@@ -195,7 +195,7 @@ impl Illuminants {
         Illuminants { fixed: true, ..self }
     }
 
-    /// Multiplies the lights.
+    /// Multiplies the lights. The scope of one number for all is of no account.
     pub fn intensity(self, intensity: Intensity, scope: IntensityScope) -> Self {
         Illuminants { intensity: Some((intensity, scope)), ..self }
     }

@@ -179,6 +179,9 @@ impl SceneBuilder {
                 return fault("name", SceneErrorKind::Reserved(name.clone()));
             }
             let id = |name: &str| Stream::named(0, name).id();
+            if id(name) == Stream::new(0).id() {
+                return fault("name", SceneErrorKind::StreamZero(name.clone()));
+            }
             for other in self.groups[..number].iter().map(|other| &other.base().name) {
                 if other == name {
                     return fault("name", SceneErrorKind::SameName(name.clone()));

@@ -28,6 +28,8 @@ pub(super) struct GroupPlan {
     pub(super) max_attempts: u32,
     pub(super) shapes: Shapes,
     pub(super) intensity: Option<Varying>,
+    /// Factor of all its lights, where that is one number.
+    pub(super) fixed_intensity: Option<f32>,
     /// For targets that are asked for what it sees; all others have it from their recipe.
     pub(super) observer: Option<Observer>,
     pub(super) arrays: Vec<Array>,
@@ -189,18 +191,55 @@ impl GroupPlan {
                 (GroupKind::Target, Shapes::Target(Box::new(target)), None)
             }
         };
-        let arrays = arrays(group, &shapes, intensity.as_ref(), grid.len());
+        let fixed_intensity = match group {
+            Group::Illuminants(Illuminants { intensity: Some((Intensity::Fixed(factor), _)), .. }) => {
+                Some(*factor as f32)
+            }
+            _ => None,
+        };
+        let intensities = match (&intensity, fixed_intensity) {
+            (Some(varying), _) => Intensities::Varying(varying.scope),
+            (None, Some(_)) => Intensities::Fixed,
+            (None, None) => Intensities::None,
+        };
+        let arrays = arrays(group, &shapes, intensities, grid.len());
         let model = match &shapes {
             Shapes::Engine(drawing) | Shapes::Once(drawing) => Some(drawing.recipe.model().clone()),
             Shapes::Target(_) => base.model.clone(),
         };
         let (name, max_attempts) = (base.name.clone(), base.max_attempts);
-        Ok(GroupPlan { name, kind, model, count, stream, max_attempts, shapes, intensity, observer, arrays })
+        Ok(GroupPlan {
+            name,
+            kind,
+            model,
+            count,
+            stream,
+            max_attempts,
+            shapes,
+            intensity,
+            fixed_intensity,
+            observer,
+            arrays,
+        })
     }
 
     /// Whether it has an array of a quantity.
     pub(super) fn gives(&self, quantity: Quantity) -> bool {
         self.arrays.iter().any(|array| array.quantity == quantity)
+    }
+
+    /// Number of scenes in a row that share a draw.
+    pub(super) fn round(&self) -> u64 {
+        match &self.shapes {
+            Shapes::Target(target) => target.round().unwrap_or(1),
+            Shapes::Engine(_) | Shapes::Once(_) => 1,
+        }
+    }
+
+    /// Array of the intensities of its lights and their values, where one number is the factor of all.
+    pub(super) fn fixed_intensities(&self) -> Option<(&Array, Vec<f32>)> {
+        let array = self.arrays.iter().find(|array| array.quantity == Quantity::Intensity)?;
+        Some((array, vec![self.fixed_intensity?; self.count as usize]))
     }
 
     /// Spectra that the engine draws, if it draws any.
@@ -261,6 +300,10 @@ fn with_mean(model: &Model, mean: &[f64]) -> Result<Model, SceneErrorKind> {
     if mean.len() != model.bands() {
         return Err(SceneErrorKind::MeanLength { found: mean.len(), expected: model.bands() });
     }
+    if let Some(band) = mean.iter().position(|&power| power < 0.0) {
+        let (power, wavelength) = (mean[band], model.grid().wavelength(band));
+        return Err(SceneErrorKind::NegativeMean { power, wavelength });
+    }
     let power = mean.iter().sum::<f64>() / mean.len() as f64;
     if !(power > 0.0 && power.is_finite()) {
         return Err(SceneErrorKind::DarkMean(power));
@@ -278,7 +321,16 @@ pub(super) fn is_multiplied(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Spectra | Quantity::Xyz | Quantity::LinearSrgb)
 }
 
-fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: usize) -> Vec<Array> {
+/// Intensities of a group.
+#[derive(Clone, Copy, PartialEq)]
+enum Intensities {
+    None,
+    /// One number for all lights of all scenes.
+    Fixed,
+    Varying(IntensityScope),
+}
+
+fn arrays(group: &Group, shapes: &Shapes, intensities: Intensities, bands: usize) -> Vec<Array> {
     let base = group.base();
     let count = base.count as usize;
     let once = matches!(shapes, Shapes::Once(_));
@@ -305,13 +357,17 @@ fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: us
         range: (quantity == Quantity::Spectra).then_some(range),
     };
     let mut arrays = Vec::new();
+    let varies = matches!(intensities, Intensities::Varying(_));
     if base.wants(Quantity::Spectra) {
-        arrays.push(array(Quantity::Spectra, !once || intensity.is_some(), &[count, bands]));
+        arrays.push(array(Quantity::Spectra, !once || varies, &[count, bands]));
     }
-    match intensity.map(|intensity| intensity.scope) {
-        Some(IntensityScope::Scene) => arrays.push(array(Quantity::Intensity, true, &[])),
-        Some(IntensityScope::Light) => arrays.push(array(Quantity::Intensity, true, &[count])),
-        None => {}
+    match intensities {
+        Intensities::Varying(IntensityScope::Scene) => arrays.push(array(Quantity::Intensity, true, &[])),
+        Intensities::Varying(IntensityScope::Light) => {
+            arrays.push(array(Quantity::Intensity, true, &[count]));
+        }
+        Intensities::Fixed => arrays.push(array(Quantity::Intensity, false, &[count])),
+        Intensities::None => {}
     }
     let mut flat = false;
     if let Group::Targets(Targets { aim, .. }) = group {
@@ -324,7 +380,7 @@ fn arrays(group: &Group, shapes: &Shapes, intensity: Option<&Varying>, bands: us
     for &quantity in Quantity::COLOURS {
         // The given tristimulus values of a hue are among them already.
         if base.wants(quantity) && arrays.iter().all(|array| array.quantity != quantity) {
-            let scales = intensity.is_some() && is_multiplied(quantity);
+            let scales = varies && is_multiplied(quantity);
             arrays.push(array(quantity, !once || scales, &[count, quantity.channels().len()]));
         }
     }

@@ -93,11 +93,17 @@ impl<'a> SceneSampler<'a> {
         Self: 'a,
     {
         let plans = self.scene.plans.iter().zip(&self.samplers).zip(&self.once);
-        let groups = plans.map(|((plan, sampler), once)| match (plan.drawn_by_engine(), sampler) {
-            (Some(drawing), Some(sampler)) => self.drawn(device, plan, (drawing, sampler), scenes.clone()),
-            _ => made(device, (plan, self.scene.grid.len()), once.as_ref(), scenes.clone()),
+        let groups = plans.map(|((plan, sampler), once)| {
+            let mut group = match (plan.drawn_by_engine(), sampler) {
+                (Some(drawing), Some(sampler)) => {
+                    self.drawn(device, plan, (drawing, sampler), scenes.clone())?
+                }
+                _ => made(device, (plan, self.scene.grid.len()), once.as_ref(), scenes.clone())?,
+            };
+            group.values.extend(plan.fixed_intensities());
+            Ok(group)
         });
-        Ok(PreparedScene { groups: groups.collect::<Result<_, _>>()?, copies: self.copies.clone() })
+        Ok(PreparedScene { groups: groups.collect::<Result<_, EngineError>>()?, copies: self.copies.clone() })
     }
 
     /// A group that the device draws.
@@ -145,7 +151,8 @@ impl<'a> SceneSampler<'a> {
         });
         let workgroups = sizes.values.div_ceil(WORKGROUP);
         let rows = workgroups.div_ceil(device.limits().max_compute_workgroups_per_dimension).max(1);
-        let values = plan.arrays.iter().find(|array| array.quantity == Quantity::Intensity);
+        let mut varying = plan.arrays.iter().filter(|_| plan.intensity.is_some());
+        let values = varying.find(|array| array.quantity == Quantity::Intensity);
         Ok(Group {
             plan,
             copied: Some(Copied { bindings, workgroups: (workgroups.div_ceil(rows), rows) }),
@@ -197,7 +204,7 @@ fn made<'a>(
     once: Option<&SharedSpectra>,
     scenes: Range<u64>,
 ) -> Result<Group<'a>, EngineError> {
-    let columns = columns(plan, once, None, scenes, &mut DrawSummary::default())?;
+    let columns = columns(plan, once, None, (scenes.start, scenes), &mut DrawSummary::default())?;
     let spectra = match once {
         Some(once) if plan.intensity.is_none() => once.of(Quantity::Spectra),
         _ => columns.of(Quantity::Spectra),

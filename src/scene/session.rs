@@ -135,8 +135,12 @@ impl SceneSession<'_> {
     pub fn constants(&self) -> Vec<(&Array, Vec<u8>)> {
         let mut constants = Vec::new();
         for (plan, once) in self.scene.plans.iter().zip(&self.once) {
+            if let Some((array, values)) = plan.fixed_intensities() {
+                constants.push((array, bytemuck::cast_slice(&values).to_vec()));
+            }
             let Some(once) = once else { continue };
-            for array in plan.arrays.iter().filter(|array| !array.per_scene) {
+            let is_drawn = |array: &&Array| !array.per_scene && array.quantity != Quantity::Intensity;
+            for array in plan.arrays.iter().filter(is_drawn) {
                 let bytes = match array.quantity {
                     Quantity::Attempts => bytemuck::cast_slice(&once.attempts()).to_vec(),
                     quantity => bytemuck::cast_slice(once.of(quantity)).to_vec(),
@@ -151,8 +155,12 @@ impl SceneSession<'_> {
     pub fn taken_once(&self) -> Vec<GroupSummary> {
         let summary = |(plan, once): (&GroupPlan, &Option<SharedSpectra>)| {
             let mut summary = DrawSummary::default();
-            if let (Some(once), Shapes::Once(drawing)) = (once, &plan.shapes) {
-                summary.count(&once.statuses[..drawing.places as usize]);
+            match (once, &plan.shapes) {
+                (Some(once), Shapes::Once(drawing)) => {
+                    summary.count(&once.statuses[..drawing.places as usize]);
+                }
+                (_, Shapes::Target(target)) => summary.count(&target.statuses_once()),
+                _ => {}
             }
             GroupSummary { group: plan.name.clone(), summary }
         };
@@ -169,7 +177,7 @@ impl SceneSession<'_> {
         let (scene, once) = (self.scene, &self.once);
         let none = |plan: &GroupPlan| GroupSummary { group: plan.name.clone(), ..GroupSummary::default() };
         let mut summaries: Vec<_> = scene.plans.iter().map(none).collect();
-        let mut next = scenes.start;
+        let (first, mut next) = (scenes.start, scenes.start);
         let mut window = |batches: &[Batch], count: u64| {
             let part = next..next + count;
             next = part.end;
@@ -178,7 +186,8 @@ impl SceneSession<'_> {
             for ((plan, once), summary) in scene.plans.iter().zip(once).zip(&mut summaries) {
                 let drawing = plan.drawn_by_engine();
                 let batch = drawing.and_then(|drawing| batches.next().map(|batch| (drawing, batch)));
-                let columns = columns(plan, once.as_ref(), batch, part.clone(), &mut summary.summary)?;
+                let columns =
+                    columns(plan, once.as_ref(), batch, (first, part.clone()), &mut summary.summary)?;
                 arrays.extend(columns.arrays(plan));
             }
             sink(Window { scenes: part, arrays })
@@ -213,12 +222,13 @@ impl SceneSession<'_> {
     }
 }
 
-/// The columns of a group in some scenes.
+/// The columns of a group in some scenes, of a run whose first scene is `first`. What scenes share is counted in the
+/// first of them that the run has.
 pub(super) fn columns<'a>(
     plan: &'a GroupPlan,
     once: Option<&'a SharedSpectra>,
     batch: Option<(&Drawing, &Batch<'a>)>,
-    scenes: Range<u64>,
+    (first, scenes): (u64, Range<u64>),
     summary: &mut DrawSummary,
 ) -> Result<Columns<'a>, EngineError> {
     let count = (scenes.end - scenes.start) as usize;
@@ -247,7 +257,11 @@ pub(super) fn columns<'a>(
                 elements.map(|(scene, element)| target.draw(plan.stream, scene, element)).collect();
             let statuses: Vec<DrawStatus> = drawn.iter().filter_map(|drawn| drawn.status).collect();
             check(plan, plan.count, scenes.start, &statuses)?;
-            summary.count(&statuses);
+            if !statuses.is_empty() {
+                let rows = scenes.clone().zip(statuses.chunks_exact(plan.count as usize));
+                let own = rows.filter(|(scene, _)| target.is_drawn_for(*scene, first));
+                own.for_each(|(_, statuses)| summary.count(statuses));
+            }
             let values = |quantity| -> Vec<f32> {
                 match (quantity, &plan.observer) {
                     (Quantity::Spectra, _) => drawn.iter().flat_map(|d| &d.spectrum).copied().collect(),

@@ -7,10 +7,10 @@ use crate::cpu::Kernel;
 use crate::dataset::SpectrumKind;
 use crate::draw_status::DrawStatus;
 use crate::program::condition::Condition;
-use crate::program::{self, LrvLaw, LrvTarget, Program};
+use crate::program::{self, Bounds, LrvLaw, LrvTarget, Program};
 use crate::random::real::Arithmetic;
 use crate::random::stream::{self, Stream};
-use crate::recipe::{ProposalKind, Recipe, RecipeBuilder, RecipeError};
+use crate::recipe::{DEFAULT_MAX_ATTEMPTS, ProposalKind, Recipe, RecipeBuilder, RecipeError};
 
 use super::error::SceneErrorKind;
 use super::group::{Copies, Hue, LrvLevels, TargetConstraint, Targets};
@@ -62,8 +62,7 @@ impl TargetPlan {
         let builder = Recipe::builder(model)
             .covariance_scale(targets.base.covariance_scale)
             .max_attempts(targets.base.max_attempts);
-        let built =
-            |recipe: Result<Recipe, RecipeError>| recipe.map_err(|e| (key(&e), SceneErrorKind::Recipe(e)));
+        let built = |recipe: Result<Recipe, RecipeError>| recipe.map_err(|e| because_of(&targets.aim, e));
         match &targets.aim {
             TargetConstraint::Lrv(levels) => {
                 let builder = builder.bounds(targets.bounds);
@@ -133,6 +132,29 @@ impl TargetPlan {
         }
     }
 
+    /// Statuses of the draws that serve all scenes.
+    pub(super) fn statuses_once(&self) -> Vec<DrawStatus> {
+        match self {
+            TargetPlan::Once { shapes, .. } => shapes.iter().filter_map(|shape| shape.status).collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Number of scenes in a row whose targets are copies of one draw; `None` where all scenes' are.
+    pub(super) fn round(&self) -> Option<u64> {
+        match self {
+            TargetPlan::Once { .. } => None,
+            TargetPlan::Rounds { levels, .. } => Some(levels.len() as u64),
+            _ => Some(1),
+        }
+    }
+
+    /// Whether the targets of `scene` are those that are drawn, rather than copies of another scene's, in a run whose
+    /// first scene is `first`.
+    pub(super) fn is_drawn_for(&self, scene: u64, first: u64) -> bool {
+        self.round().is_some_and(|round| scene == first || scene.is_multiple_of(round))
+    }
+
     /// Target `element` of `scene`. The stream is in rows of as many as a scene has.
     pub(super) fn draw(&self, stream: Stream, scene: u64, element: u32) -> DrawnTarget {
         let row = u64::from(stream.row());
@@ -177,15 +199,11 @@ impl TargetPlan {
 }
 
 impl DrawnTarget {
-    /// Rescales the target to another luminous reflectance.
+    /// Rescales the target to another luminous reflectance. Its status stays that of the draw.
     fn scaled(mut self, from: f64, to: f64) -> DrawnTarget {
         let by = (to / from) as f32;
         self.spectrum.iter_mut().for_each(|value| *value *= by);
         self.lrv = to as f32;
-        let (accepted, above_one) =
-            (self.status.map_or(0, DrawStatus::attempts), self.spectrum.iter().any(|&value| value >= 1.0));
-        self.status =
-            Some(if accepted == 0 { DrawStatus::FAILED } else { DrawStatus::accepted(accepted, above_one) });
         self
     }
 }
@@ -199,6 +217,20 @@ impl Hue {
             lightness * (1.0 - saturation * k.min(4.0 - k).clamp(0.0, 1.0))
         };
         colorimetry::linear_srgb_to_xyz([5.0, 3.0, 1.0].map(component))
+    }
+}
+
+/// The key of a target that an error of its recipe is about, and the error.
+fn because_of(aim: &TargetConstraint, error: RecipeError) -> (&'static str, SceneErrorKind) {
+    let is_hopeless = matches!(error, RecipeError::Hopeless { .. });
+    match aim {
+        TargetConstraint::Lrv(LrvLevels::Uniform(from, to)) if is_hopeless => {
+            ("lrv", SceneErrorKind::HopelessRange { from: *from, to: *to, source: error })
+        }
+        TargetConstraint::Lrv(_) if is_hopeless => ("lrv", SceneErrorKind::Recipe(error)),
+        TargetConstraint::Xyz(_) if is_hopeless => ("xyz", SceneErrorKind::Recipe(error)),
+        TargetConstraint::Hue(_) if is_hopeless => ("hue", SceneErrorKind::Recipe(error)),
+        _ => (key(&error), SceneErrorKind::Recipe(error)),
     }
 }
 
@@ -219,6 +251,19 @@ fn corners(hue: &Hue) -> [(f64, f64); 4] {
     [(a, c), (a, d), (b, c), (b, d)]
 }
 
+/// Reason for which settings of draws mean nothing for flat targets.
+pub(super) const FLAT_IS_NOT_DRAWN: &str = "for a flat target, which is drawn from no model";
+
+/// Reason for which bounds mean nothing for targets without a luminous reflectance to scale to.
+pub(super) fn bounds_without_lrv(aim: &TargetConstraint) -> &'static str {
+    match aim {
+        TargetConstraint::Flat(_) => {
+            "for a flat target, which is the same in every band and never out of bounds"
+        }
+        _ => "without an lrv: a spectrum of given tristimulus values is not scaled",
+    }
+}
+
 /// Checks the targets for errors that their recipe cannot find.
 fn check(targets: &Targets) -> Result<(), (&'static str, SceneErrorKind)> {
     let level = |value: f64| match value > 0.0 && value < 1.0 {
@@ -229,6 +274,18 @@ fn check(targets: &Targets) -> Result<(), (&'static str, SceneErrorKind)> {
     {
         let (found, wanted) = (model.kind(), SpectrumKind::Reflectance);
         return Err(("model", SceneErrorKind::Kind { found, wanted }));
+    }
+    let pointless = |key, with| Err((key, SceneErrorKind::Pointless { with }));
+    if let TargetConstraint::Flat(_) = targets.aim {
+        let base = &targets.base;
+        let settings = [
+            ("model", base.model.is_some()),
+            ("cov_scale", base.covariance_scale != 1.0),
+            ("max_attempts", base.max_attempts != DEFAULT_MAX_ATTEMPTS),
+        ];
+        if let Some((key, _)) = settings.into_iter().find(|(_, is_set)| *is_set) {
+            return pointless(key, FLAT_IS_NOT_DRAWN);
+        }
     }
     match &targets.aim {
         TargetConstraint::Lrv(levels) | TargetConstraint::Flat(levels) => match levels {
@@ -265,7 +322,10 @@ fn check(targets: &Targets) -> Result<(), (&'static str, SceneErrorKind)> {
     }
     let has_lrv = matches!(targets.aim, TargetConstraint::Lrv(_));
     if !has_lrv && targets.copies != Copies::Independent {
-        return Err(("copies", SceneErrorKind::Pointless { with: "without an lrv to scale to" }));
+        return pointless("copies", "without an lrv to scale to");
+    }
+    if !has_lrv && targets.bounds != Bounds::default() {
+        return pointless("bounds", bounds_without_lrv(&targets.aim));
     }
     Ok(())
 }

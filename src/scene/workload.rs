@@ -31,8 +31,10 @@ pub struct GroupWorkload {
     pub kind: GroupKind,
     /// The number of the shader that draws it, from 1; none where the CPU does.
     pub shader: Option<usize>,
-    /// Number of spectra drawn for each scene.
+    /// Number of spectra drawn for each scene, or for each round of scenes.
     pub draws_per_scene: u64,
+    /// Number of scenes in a row that share a draw and have copies of it; 1 where each scene has draws of its own.
+    pub scenes_per_round: u64,
     /// Number of spectra drawn once for all scenes.
     pub draws_once: u64,
     /// Its arrays.
@@ -40,7 +42,7 @@ pub struct GroupWorkload {
 }
 
 impl Scene {
-    /// Computes the workload of drawing a number of scenes.
+    /// Computes the workload of drawing a number of scenes, the first of which begins a round where rounds share draws.
     pub fn workload(&self, scenes: u64) -> Workload {
         let mut programs: Vec<&crate::program::Program> = Vec::new();
         let mut left_out = Vec::new();
@@ -78,6 +80,7 @@ impl Scene {
                 kind: plan.kind,
                 shader,
                 draws_per_scene,
+                scenes_per_round: plan.round(),
                 draws_once,
                 arrays: plan.arrays.clone(),
             });
@@ -94,7 +97,7 @@ impl Scene {
         }
         Workload {
             shaders: programs.len(),
-            draws: groups.iter().map(|group| group.draws_once + scenes * group.draws_per_scene).sum(),
+            draws: groups.iter().map(|group| group.draws(scenes)).sum(),
             bytes: self.arrays().map(|a| a.bytes() as u64 * if a.per_scene { scenes } else { 1 }).sum(),
             groups,
             left_out,
@@ -102,7 +105,14 @@ impl Scene {
     }
 }
 
-/// Number of spectra drawn for each scene, and number drawn once.
+impl GroupWorkload {
+    /// Number of spectra drawn for a number of scenes.
+    fn draws(&self, scenes: u64) -> u64 {
+        self.draws_once + scenes.div_ceil(self.scenes_per_round) * self.draws_per_scene
+    }
+}
+
+/// Number of spectra drawn for each scene or round, and number drawn once.
 fn draws(plan: &GroupPlan) -> (u64, u64) {
     match &plan.shapes {
         Shapes::Engine(drawing) => (drawing.places.into(), 0),
@@ -134,6 +144,11 @@ fn spared(plan: &GroupPlan) -> Option<String> {
         Shapes::Target(target) => match **target {
             TargetPlan::Flat { .. } => format!("{name}: flat spectra are not drawn"),
             TargetPlan::Once { .. } => format!("{name}: its copies have the same shape, so it is drawn once"),
+            TargetPlan::Rounds { .. } => {
+                format!(
+                    "{name}: each round through its levels has copies of one draw, made on the CPU without a shader"
+                )
+            }
             _ => format!("{name}: targets are few, so they are drawn on the CPU without a shader"),
         },
     })

@@ -168,16 +168,37 @@ fn forms(text: &mut Text, name: &str, map: &Affine) {
     }
 }
 
-/// The fragment `looped.wgsl` with the program's constants.
+/// The components that are written out one after another. Drivers take long over more.
+const TILE: usize = 64;
+
+/// Number of times that a sum over so many components goes round its loop.
+pub(super) fn tiles(components: usize) -> usize {
+    if components > TILE { components / TILE } else { 0 }
+}
+
+/// The fragment `arithmetic_looped.wgsl` with the program's constants.
 fn looped(program: &Program, tables: &Tables) -> Text {
     let (n, k) = (program.bands(), program.components());
     let mut text = Text::default();
-    for (name, value) in [("BANDS", n), ("COMPONENTS", k), ("BLOCKS", k.div_ceil(4))] {
+    for (name, value) in [("BANDS", n), ("BLOCKS", k.div_ceil(4))] {
         text.line(&format!("const {name} = {value}u;"));
     }
     text.line("");
     text.0 += LOOPED;
-    text.line("");
+    text.line("\n// A row of the model: a band, or a value of another quantity.");
+    text.line("fn form(z: ptr<function, Normals>, row: u32) -> f32 {");
+    text.line(&format!("    let start = row * {}u;", k + 1));
+    text.line("    var s = tables[start];");
+    let looped = TILE * tiles(k);
+    if looped > 0 {
+        text.line(&format!("    for (var j = 0u; j < {looped}u; j += {TILE}u) {{"));
+        (0..TILE).for_each(|i| {
+            text.line(&format!("        s += tables[start + j + {}u] * (*z)[j + {i}u];", i + 1))
+        });
+        text.line("    }");
+    }
+    (looped..k).for_each(|j| text.line(&format!("    s += tables[start + {}u] * (*z)[{j}];", j + 1)));
+    text.line("    return s;\n}\n");
     match &program.proposal {
         Some(proposal) => text.0 += &proposal.rounded::<f32>().text(4 * k.div_ceil(4), COVER_AT),
         None => text.0 += NORMALS,

@@ -40,7 +40,7 @@ pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, WgslErro
     if program.proposal.is_some() {
         return Err(WgslError::Table("the boxes that candidates are proposed from"));
     }
-    let draw = functions(program, &Tables::default(), Dialect::Baseline, None);
+    let draw = functions(program, &Tables::default(), Dialect::Baseline, false, None);
     // What naga_oil imports may name structures, but no other types.
     let normals = format!("array<f32, {}>", program.components());
     let draw = draw.replace(&format!("alias Normals = {normals};\n"), "").replace("Normals", &normals);

@@ -68,7 +68,7 @@ struct Store<'a> {
     form: Form,
     /// The names of the thread's draws.
     draws: &'static [&'static str],
-    /// What is left out.
+    /// Part that is left out.
     part: Option<Part>,
 }
 

@@ -78,7 +78,7 @@ impl Compared {
         format!("{} and {} draws of seed {}", self.sources, grouped(self.figures.draws as u64), self.seed)
     }
 
-    /// How far the draws are from the data, in a sentence.
+    /// Describes in a sentence how far the draws are from the data.
     pub(super) fn sentence(&self) -> String {
         let weights = self.figures.weights.iter().enumerate();
         let farthest = weights.clone().max_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
@@ -103,22 +103,22 @@ impl Compared {
         let _ = writeln!(
             text,
             "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}{:>9}",
-            "weight", "mean of", "sd of", "skewness", "skewness", "Kolmogorov", "p"
+            "weight", "shift of", "ratio of", "skewness", "skewness", "Kolmogorov", "p"
         );
         let _ = writeln!(
             text,
-            "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}{:>9}",
-            "", "draws, sd", "draws, sd", "of data", "of draws", "-Smirnov", ""
+            "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}",
+            "", "mean, sd", "sds", "of data", "of draws", "-Smirnov"
         );
         for (index, weight) in self.figures.weights.iter().enumerate() {
             let _ = writeln!(
                 text,
                 "{:>9}{:>11.3}{:>11.3}{:>11.2}{:>11.2}{:>11.3}{:>9}",
                 index + 1,
-                weight.mean_shift,
+                unsigned_zero(weight.mean_shift, 3),
                 weight.drawn.sd / weight.measured.sd,
-                weight.measured.skewness,
-                weight.drawn.skewness,
+                unsigned_zero(weight.measured.skewness, 2),
+                unsigned_zero(weight.drawn.skewness, 2),
                 weight.distance,
                 p_value(weight.p_value),
             );
@@ -142,6 +142,11 @@ impl Compared {
         }
         text
     }
+}
+
+/// The value, without its sign where it rounds to zero.
+fn unsigned_zero(value: f64, decimals: i32) -> f64 {
+    if value.abs() < 0.5 * 10f64.powi(-decimals) { 0.0 } else { value }
 }
 
 fn p_value(p: f64) -> String {

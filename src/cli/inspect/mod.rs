@@ -16,7 +16,7 @@ mod comparison;
 
 use self::comparison::Compared;
 use super::options::RecipeArguments;
-use super::parse::grouped;
+use super::parse::{grouped, number};
 use super::{if_exists, picture};
 
 /// Show the contents of a model: a table, and a picture where asked
@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     request: RecipeArguments,
 
     /// The seed of the draws in the picture, and of those that are compared with data
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = number, allow_negative_numbers = true)]
     pub(crate) seed: u64,
 
     /// Print all of it as JSON

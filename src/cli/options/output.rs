@@ -10,7 +10,7 @@ use spectroll::output::{ChunkFormat, FileFormat, IfExists, SetMode, Shard};
 use super::shard::ShardName;
 use crate::cli::exit::Usage;
 use crate::cli::if_exists;
-use crate::cli::parse::count;
+use crate::cli::parse::{between, count};
 
 /// The options of what is written.
 #[derive(clap::Args)]
@@ -23,19 +23,20 @@ pub(in crate::cli) struct OutputArguments {
     /// The format [default: what the name says]
     #[arg(long, value_enum)]
     format: Option<FileFormat>,
-    /// The type of the numbers; beside f16 spectra, labels such as lrv, intensity and xyz stay f32
+    /// The type of the numbers; beside f16 spectra, labels such as lrv, intensity and xyz stay f32, and spectra that are
+    /// too bright or too dim for f16 are an error
     #[arg(long, value_enum, default_value = "f32")]
     dtype: Dtype,
     /// Number of draws per chunk of a .zarr or of FOLDER/ [default: about 16 MiB]
-    #[arg(long, value_name = "DRAWS", value_parser = count)]
+    #[arg(long, value_name = "DRAWS", value_parser = count, allow_negative_numbers = true)]
     chunk: Option<u64>,
     /// Pack the chunks of a .zarr with Zstandard [level: 3]
-    #[arg(long, value_name = "LEVEL", num_args = 0..=1, default_missing_value = "3",
-          value_parser = clap::value_parser!(i32).range(1..=22))]
-    zstd: Option<i32>,
+    #[arg(long, value_name = "LEVEL", num_args = 0..=1, default_missing_value = "3", value_parser = between::<1, 22>,
+          allow_negative_numbers = true)]
+    zstd: Option<u32>,
     /// Make only the I-th of N parts of a .zarr or FOLDER/; auto takes them from Slurm's or Kubernetes' variables, which
     /// a --dry-run does without
-    #[arg(long, value_name = "I/N|auto|auto/N")]
+    #[arg(long, value_name = "I/N|auto|auto/N", allow_hyphen_values = true)]
     shard: Option<ShardName>,
     /// Go on with a .zarr or FOLDER/ that an earlier run began, if one did
     #[arg(long)]
@@ -109,7 +110,10 @@ impl OutputArguments {
         let destination = match self.format {
             format if self.to_stdout() => Destination::Stdout(format.unwrap_or(FileFormat::Csv)),
             _ => match self.format.map_or_else(|| FileFormat::of(&self.output), Ok)? {
-                FileFormat::Zarr => Destination::Set(ChunkFormat::Zarr { zstd: self.zstd }),
+                FileFormat::Zarr => {
+                    let zstd = self.zstd.map(|level| level as i32); // at most 22
+                    Destination::Set(ChunkFormat::Zarr { zstd })
+                }
                 FileFormat::Spd => Destination::SpdFolder,
                 FileFormat::Npy if is_folder => Destination::Set(ChunkFormat::Npy),
                 FileFormat::Parquet if is_folder => Destination::Set(ChunkFormat::Parquet),

@@ -6,28 +6,31 @@ use spectroll::{
     RecipeError, RecipeSettings, XyzScale,
 };
 
+use crate::cli::parse::{attempts, factor};
+
 /// Settings of the draws, and the quantities to write of them.
 #[derive(Clone, clap::Args)]
 pub(in crate::cli) struct RecipeArguments {
     /// Scale every reflectance to this luminous reflectance value (LRV): CIE Y of the 1931 2 degree observer under D65,
     /// 1 for a perfect white; or, as LOW..HIGH, each to one of its own, uniform between the two (--quantities lrv
     /// writes it)
-    #[arg(long, value_name = "Y|LOW..HIGH", allow_negative_numbers = true, value_parser = lrv)]
+    #[arg(long, value_name = "Y|LOW..HIGH", allow_hyphen_values = true, value_parser = lrv)]
     pub(in crate::cli) lrv: Option<Lrv>,
     /// Spectrum that must be between 0 and 1 where there is an --lrv
     #[arg(long, value_enum, default_value = "base", requires = "lrv")]
     bounds: Bounds,
     /// Multiply the covariance of the weights
-    #[arg(long, default_value_t = 1.0, value_name = "C", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1.0, value_name = "C", value_parser = factor, allow_negative_numbers = true)]
     cov_scale: f64,
     /// Multiply illuminants: a number, LOW..HIGH (uniform in the logarithm), or data (resample the measured spectra's own
     /// mean powers)
-    #[arg(long, value_name = "I", value_parser = intensity)]
+    #[arg(long, value_name = "I", value_parser = intensity, allow_hyphen_values = true)]
     intensity: Option<Intensity>,
     /// Quantities to write for each draw (comma-separated)
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", default_value = "spectra")]
     quantities: Vec<Quantity>,
-    /// The illuminant of reflectances' XYZ and linear sRGB
+    /// The illuminant of reflectances' XYZ, chromaticity and linear sRGB; linear sRGB has the matrix of D65, without
+    /// chromatic adaptation
     #[arg(long, value_enum, default_value = "d65")]
     illuminant: IlluminantName,
     /// The scale of illuminants' XYZ and linear sRGB
@@ -37,7 +40,8 @@ pub(in crate::cli) struct RecipeArguments {
     #[arg(long, value_enum, default_value = "auto")]
     proposal: ProposalKind,
     /// The most candidates that a draw may take
-    #[arg(long, default_value_t = DEFAULT_MAX_ATTEMPTS, value_name = "N")]
+    #[arg(long, default_value_t = DEFAULT_MAX_ATTEMPTS, value_name = "N", value_parser = attempts,
+          allow_negative_numbers = true)]
     max_attempts: u32,
 }
 

@@ -1,5 +1,6 @@
 //! Sentences of summaries and dry runs that all commands which make data sets share.
 
+use spectroll::Model;
 use spectroll::export::{Destination, Output, Space};
 use spectroll::output::{ByteCount, Schema, SetStatus, Shard};
 
@@ -24,6 +25,16 @@ pub(in crate::cli) fn above_one(above_one: u64, draws: u64, setting: &str) -> Op
     (above_one > 0).then(|| {
         format!("{count} ({share:.2} %) {verb} 1 or more after scaling: use {setting} to keep all below 1")
     })
+}
+
+/// Says that draws cannot have the mean of their model, where that is so.
+pub(in crate::cli) fn impossible_mean(model: &Model) -> Option<String> {
+    let (wavelength, value) = model.impossible_mean()?;
+    let bound = if value < 0.0 { "above 0" } else { "below 1" };
+    Some(format!(
+        "the model's mean is {value:.4} at {wavelength} nm, and spectra are {bound}: their mean is another, so check the \
+         data of the model"
+    ))
 }
 
 /// The part of a set that this process makes, where there are several.

@@ -14,7 +14,7 @@ pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Resul
         .zip(columns)
         .map(|(field, column)| {
             let shape = field.shape((column.len() / field.delivered_bytes()) as u64);
-            let bytes = npy::file(npy::type_string(field.stored), &shape, &field.store(column)?)?;
+            let bytes = npy::file(npy::type_string(field.stored), &shape, &field.store(column)?);
             Ok(Part { name: format!("{}-{index:06}.npy", field.name), bytes: bytes.into() })
         })
         .collect()
@@ -23,14 +23,14 @@ pub(super) fn npy(schema: &Schema, index: u64, columns: &[Vec<u8>]) -> io::Resul
 /// Encodes the wavelengths, which the `.npy` files of the chunks do not hold.
 pub(super) fn npy_metadata(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
     let bytes: Vec<u8> = schema.wavelengths.iter().flat_map(|w| w.to_le_bytes()).collect();
-    let bytes = npy::file("<f8", &[schema.wavelengths.len() as u64], &bytes)?;
+    let bytes = npy::file("<f8", &[schema.wavelengths.len() as u64], &bytes);
     Ok(vec![Part { name: "wavelength.npy".to_owned(), bytes: bytes.into() }])
 }
 
 /// Encodes the `.npy` files of the arrays that all draws share.
 pub(super) fn npy_constants(schema: &Schema) -> io::Result<Vec<Part<'static>>> {
     let part = |constant: &SharedArray| {
-        let bytes = npy::file(npy::type_string(constant.dtype), &constant.shape(), &constant.bytes)?;
+        let bytes = npy::file(npy::type_string(constant.dtype), &constant.shape(), &constant.bytes);
         Ok(Part { name: format!("{}.npy", constant.name), bytes: bytes.into() })
     };
     schema.shared.iter().map(part).collect()
