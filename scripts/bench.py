@@ -54,17 +54,10 @@ class Figures:
 
 
 def peers_model(folder):
-    """The built-in model as `peers.py` reads it: mean, basis, standard deviations."""
+    """The built-in model as a file, for `peers.py`."""
     path = os.path.join(folder, "model.json")
     run(SPECTROLL, "fit", "munsell", "vrhel", "-o", path)
-    with open(path) as file:
-        model = json.load(file)
-    deviations = [row[i] ** 0.5 for i, row in enumerate(model["weight_covariance"])]
-    numbers = model["mean"] + sum(model["basis"], []) + deviations
-    text = os.path.join(folder, "model.txt")
-    with open(text, "w") as file:
-        file.write("\n".join(map(repr, numbers)))
-    return text
+    return path
 
 
 def in_process(rounds, model):
@@ -73,7 +66,7 @@ def in_process(rounds, model):
         for rate in json.loads(run(SPECTROLL, "bench", "--json", "--runs", "5")[0])["rates"]:
             rates.add(rate["engine"], rate["median"])
         for peer in ("numpy", "numba"):
-            rates.add(peer, float(run(sys.executable, PEERS, model, "4e6", peer)[0]))
+            rates.add(peer, float(run(sys.executable, PEERS, model, peer, "4e6")[0]))
     print("In process, reflectances of 31 bands and 6 components, mapped for reading:")
     rates.show("million/s")
     for engine in [name for name in rates.samples if name not in ("numpy", "numba")]:
@@ -89,7 +82,7 @@ def whole_process(rounds, model, count):
         "spectroll --engine gpu": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force", "--engine", "gpu"],
         "spectroll --engine cpu": [SPECTROLL, "sample", "munsell-vrhel", "-n", str(count), "-o", out, "-q", "--force", "--engine", "cpu"],
         "dd": ["dd", "if=/dev/zero", f"of={out}", "bs=4M", f"count={size >> 22}", "status=none"],
-        "numpy": [sys.executable, PEERS, model, str(count), "numpy", out],
+        "numpy": [sys.executable, PEERS, model, "numpy", str(count), out],
     }
     try:
         for _ in range(rounds):

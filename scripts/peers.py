@@ -1,70 +1,142 @@
-"""The same draws as one would write them in Python: reflectances of a Gaussian model, kept where all bands are in (0, 1).
+"""The same draws as one would write them in Python: spectra of a Gaussian model, kept where all bands are physical.
 
-    peers.py MODEL.txt COUNT numpy|numba [OUT.npy]
+    peers.py MODEL.json numpy|numba [COUNT [OUT.npy]]
 
-MODEL.txt has the mean (31 values), the basis (6 x 31) and the deviations of the weights (6). Prints million spectra a
-second, the best of three runs; with OUT.npy it fills that file once, and prints nothing.
+With COUNT it prints million spectra a second, the best of three runs; with OUT.npy it fills that file once, and prints
+nothing. Without, it answers requests: for each line "COUNT SEED" on standard input it draws, in blocks, and writes the
+blocks, each a line "ROWS" and the values in 32 bits, and at last a line "0 SECONDS CANDIDATES". The first line that it
+writes describes it, as JSON. Only the drawing is timed.
 """
 
+import json
+import signal
 import sys
 import time
 
-import numpy as np
-
-BANDS, COMPONENTS, BLOCK = 31, 6, 1 << 18
+BLOCK = 1 << 18
 
 
-def with_numpy(mean, gain):
+class Model:
+    """Mean, gain (a row a component) and largest value of the spectra, in 32 bits."""
+
+    def __init__(self, path):
+        with open(path) as file:
+            model = json.load(file)
+        basis = np.array(model["basis"])
+        values, vectors = np.linalg.eigh(np.array(model["weight_covariance"]))
+        gain = (vectors * np.sqrt(values.clip(0))).T @ basis
+        mean = model["mean"] + np.array(model.get("weight_mean", np.zeros(len(basis)))) @ basis
+        self.mean, self.gain = mean.astype(np.float32), np.ascontiguousarray(gain, np.float32)
+        self.limit = np.float32(1 if model["kind"] == "reflectance" else np.inf)
+
+
+def with_numpy(model):
+    generator, shares = np.random.Generator(np.random.SFC64(0)), [1, 1]
+
     def fill(out, seed):
-        generator, done = np.random.Generator(np.random.SFC64(seed)), 0
+        nonlocal generator
+        if seed is not None:
+            generator = np.random.Generator(np.random.SFC64(seed))
+        done = candidates = 0
         while done < len(out):
-            spectra = generator.standard_normal((BLOCK, COMPONENTS), dtype=np.float32) @ gain + mean
-            spectra = spectra[((spectra > 0) & (spectra < 1)).all(axis=1)][: len(out) - done]
-            out[done : done + len(spectra)] = spectra
-            done += len(spectra)
+            # As many candidates as are likely to be enough.
+            count = min(BLOCK, int(1.05 * (len(out) - done) * shares[1] / shares[0]) + 16)
+            spectra = generator.standard_normal((count, len(model.gain)), dtype=np.float32) @ model.gain + model.mean
+            kept = np.flatnonzero(((spectra > 0) & (spectra < model.limit)).all(axis=1))
+            shares[0] += len(kept)
+            shares[1] += count
+            kept = kept[: len(out) - done]
+            out[done : done + len(kept)] = spectra[kept]
+            done += len(kept)
+            candidates += int(kept[-1]) + 1 if done == len(out) else count
+        return candidates
 
     return fill
 
 
-def with_numba(mean, gain):
-    import numba
-
+def with_numba(model):
     @numba.njit(parallel=True, fastmath=True)
-    def fill(out, seed):
+    def fill_in_parallel(out, seed, mean, gain, limit):
         threads, count = numba.get_num_threads(), out.shape[0]
+        components, bands = gain.shape
+        candidates = np.zeros(threads, np.int64)
         for thread in numba.prange(threads):
-            np.random.seed(seed + thread)
-            z, spectrum = np.empty(COMPONENTS, np.float32), np.empty(BANDS, np.float32)
+            if seed >= 0:
+                np.random.seed((seed * threads + thread) % (1 << 32))
+            z, spectrum = np.empty(components, np.float32), np.empty(bands, np.float32)
+            tries = 0
             for i in range(thread * count // threads, (thread + 1) * count // threads):
                 accepted = False
                 while not accepted:
-                    for j in range(COMPONENTS):
+                    tries += 1
+                    for j in range(components):
                         z[j] = np.random.standard_normal()
                     accepted = True
-                    for band in range(BANDS):
+                    for band in range(bands):
                         value = mean[band]
-                        for j in range(COMPONENTS):
+                        for j in range(components):
                             value += gain[j, band] * z[j]
                         spectrum[band] = value
-                        accepted = accepted and 0 < value < 1
-                for band in range(BANDS):
+                        accepted = accepted and 0 < value < limit
+                for band in range(bands):
                     out[i, band] = spectrum[band]
+            candidates[thread] = tries
+        return candidates.sum()
+
+    # No infinity where the compiler may suppose that there is none.
+    limit = min(model.limit, np.finfo(np.float32).max)
+
+    def fill(out, seed):
+        return int(fill_in_parallel(out, -1 if seed is None else seed, model.mean, model.gain, limit))
 
     return fill
 
 
+def say(text):
+    sys.stdout.buffer.write(text.encode() + b"\n")
+    sys.stdout.buffer.flush()
+
+
+def serve(model, fill, peer):
+    """Answers requests until standard input ends. Whoever asked is interrupted, and ends this."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    start = time.perf_counter()
+    bands = len(model.mean)
+    fill(np.empty((1, bands), np.float32), 1)
+    first = time.perf_counter() - start
+    module = {"numpy": np, "numba": sys.modules.get("numba")}[peer]
+    python = ".".join(map(str, sys.version_info[:3]))
+    threads = numba.get_num_threads() if peer == "numba" else 1
+    say(json.dumps({"version": module.__version__, "python": python, "threads": threads, "first_draw": first}))
+    buffer = np.empty((BLOCK, bands), np.float32)
+    for line in sys.stdin:
+        count, seed = map(int, line.split())
+        done, seconds, candidates = 0, 0.0, 0
+        while done < count:
+            out = buffer[: min(BLOCK, count - done)]
+            start = time.perf_counter()
+            candidates += fill(out, seed if done == 0 else None)
+            seconds += time.perf_counter() - start
+            say(str(len(out)))
+            sys.stdout.buffer.write(out.data)
+            done += len(out)
+        say(f"0 {seconds!r} {candidates}")
+
+
 def main():
-    path, count, peer, *file = sys.argv[1:]
-    numbers = np.loadtxt(path).astype(np.float32)
-    mean, basis, deviations = np.split(numbers, [BANDS, BANDS * (1 + COMPONENTS)])
-    gain = basis.reshape(COMPONENTS, BANDS) * deviations[:, None]
-    fill, shape = {"numpy": with_numpy, "numba": with_numba}[peer](mean, gain), (int(float(count)), BANDS)
-    if file:
-        out = np.lib.format.open_memmap(file[0], "w+", np.float32, shape)
+    path, peer, *rest = sys.argv[1:]
+    model = Model(path)
+    fill = {"numpy": with_numpy, "numba": with_numba}[peer](model)
+    if not rest:
+        serve(model, fill, peer)
+        return
+    shape = (int(float(rest[0])), len(model.mean))
+    if rest[1:]:
+        out = np.lib.format.open_memmap(rest[1], "w+", np.float32, shape)
         fill(out, 1)
         out.flush()
         return
-    fill(np.empty((BLOCK, BANDS), np.float32), 1)  # compiles, and warms up
+    fill(np.empty((BLOCK, shape[1]), np.float32), 1)  # compiles, and warms up
     rates = []
     for _ in range(3):
         out = np.empty(shape, np.float32)
@@ -74,4 +146,14 @@ def main():
     print(max(rates))
 
 
+try:
+    import numpy as np
+
+    if sys.argv[2:3] == ["numba"]:
+        import numba
+except ImportError as error:
+    if sys.argv[3:]:
+        sys.exit(str(error))
+    say(json.dumps({"error": str(error)}))
+    sys.exit()
 main()

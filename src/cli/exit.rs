@@ -7,7 +7,7 @@ use spectroll::output::OutputError;
 use spectroll::scene::SceneError;
 use spectroll::{DatasetError, EngineError, FitError, ModelError, Quantity, RecipeError, WgslError};
 
-use super::interrupt::Interrupted;
+use super::interrupt::{self, Interrupted};
 
 /// A request that cannot be meant, beyond what the argument parser can tell.
 #[derive(Debug, thiserror::Error)]
@@ -22,7 +22,7 @@ pub(super) struct Unverified(pub(super) String);
 /// The exit code of an error.
 pub(super) fn code(error: &anyhow::Error) -> u8 {
     if error.is::<Interrupted>() {
-        130
+        interrupt::EXIT_CODE
     } else if let Some(error) = error.downcast_ref::<EngineError>() {
         of_engine(error)
     } else if let Some(error) = error.downcast_ref::<OutputError>() {
@@ -72,7 +72,7 @@ fn of_export(error: &ExportError) -> u8 {
     match error {
         ExportError::Engine(error) => of_engine(error),
         ExportError::Output(error) => of_output(error),
-        ExportError::Interrupted => 130,
+        ExportError::Interrupted => interrupt::EXIT_CODE,
         ExportError::Unfinished { cause, .. } => of_export(cause),
         _ => 1,
     }

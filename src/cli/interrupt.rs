@@ -11,6 +11,9 @@ use spectroll::export::{Destination, Output};
 #[error("interrupted; {0}")]
 pub(super) struct Interrupted(pub(super) String);
 
+/// The exit code of interrupted work.
+pub(super) const EXIT_CODE: u8 = 130;
+
 /// Set once somebody asked for an end. Empty until [`watch`].
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
@@ -39,6 +42,17 @@ pub(super) fn watch() {
     if !is_ignored(signal_hook::consts::SIGHUP) {
         register(signal_hook::consts::SIGHUP);
     }
+}
+
+/// Catches the first Ctrl-C, for work that keeps what is done; the second one ends the program at once.
+pub(super) fn watch_once() {
+    let flag = INTERRUPTED.get_or_init(Arc::default);
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // Before the flag is set by the same signal.
+        signal_hook::flag::register_conditional_shutdown(signal, EXIT_CODE.into(), flag.clone())
+            .expect("it is a signal that can be handled");
+    }
+    watch();
 }
 
 /// Opens an output, and watches from when that should not be ended by the signal itself. Checking what is there of a set

@@ -1,12 +1,14 @@
 //! `spectroll report`: the cost of draws, their quality and extreme cases, as a page to keep.
 
 use std::cell::RefCell;
-use std::io::Write;
+use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
-use spectroll::evaluation::report::{Effort, Options, Report, ReportError, Verdict, figures, measure, page};
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use spectroll::evaluation::report::{
+    Effort, Options, Progress, Report, ReportError, Verdict, figures, measure, page,
+};
 use spectroll::output::{FolderMark, PendingFolder};
 use spectroll::{EngineChoice, adapters};
 
@@ -18,7 +20,8 @@ use super::{if_exists, model};
 
 /// Measure error against run time, accuracy, randomness and extreme cases, as a page with plots
 ///
-/// Writes a folder: report.html, which needs nothing else, report.json with all numbers, and the plots as SVG.
+/// Writes a folder: report.html, which needs nothing else, report.json with all numbers, and the plots as SVG. Ctrl-C
+/// writes what is done by then, marked as unfinished; a second Ctrl-C ends at once.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// Model files, or names of built-in models
@@ -27,12 +30,15 @@ pub(crate) struct Arguments {
     /// The folder to make
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Up to 10^6 draws: under a minute on 2 cores
+    /// Up to half a minute for a model [default: up to 3 minutes for two]
     #[arg(long, conflicts_with = "full")]
     quick: bool,
-    /// Up to 10^8 draws: the better part of an hour
+    /// Narrow intervals, which may take half an hour for a model
     #[arg(long)]
     full: bool,
+    /// Draw with NumPy and Numba too, where the Python of SPECTROLL_PYTHON, or python3, has them
+    #[arg(long)]
+    peers: bool,
     /// The seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = number, allow_negative_numbers = true)]
     seed: u64,
@@ -41,6 +47,9 @@ pub(crate) struct Arguments {
     /// Replace the folder if it exists
     #[arg(long)]
     force: bool,
+    /// Print no progress
+    #[arg(short, long)]
+    quiet: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -49,7 +58,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.engine.threads.is_some() {
         return Err(Usage("a report uses all cores: leave out --threads".to_owned()).into());
     }
-    let folder = PendingFolder::create(&arguments.output, if_exists(arguments.force), REPORT)?;
+    // Only to learn now whether it can be made: a second Ctrl-C leaves nothing behind.
+    let folder = || PendingFolder::create(&arguments.output, if_exists(arguments.force), REPORT);
+    drop(folder()?);
     let options = Options {
         models,
         engines: engines(arguments.engine.choice()),
@@ -59,19 +70,34 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             _ => Effort::Usual,
         },
         seed: arguments.seed,
+        python: arguments.peers.then(python),
     };
-    interrupt::watch();
-    let report = watched(&options)?;
+    interrupt::watch_once();
+    let report = watched(&options, Shown::to(arguments.quiet))?;
+    let path = arguments.output.join("report.html");
+    let [measured, all] = report.measured();
+    if measured == 0 {
+        return Err(Interrupted("no section was finished, and nothing was left behind".to_owned()).into());
+    }
+    let folder = folder()?;
     write(&folder, &report)?;
-    interrupt::check()?;
     folder.finish()?;
-    let mut out = std::io::stdout().lock();
+    if !report.finished {
+        let kept = format!("{} is unfinished: it has {measured} of {all} sections", path.display());
+        return Err(Interrupted(kept).into());
+    }
+    let mut out = io::stdout().lock();
     write!(out, "{}", report.summary())?;
-    writeln!(out, "{}, {:.0} s", arguments.output.join("report.html").display(), report.seconds)?;
+    writeln!(out, "{}, {:.0} s", path.display(), report.seconds)?;
     if report.verdict().is_good() {
         return Ok(());
     }
-    anyhow::bail!("{}; {:?} has them all", failures(report.verdict()), arguments.output.join("report.html"))
+    anyhow::bail!("{}; {path:?} has them all", failures(report.verdict()))
+}
+
+/// The Python that draws beside the engines.
+fn python() -> String {
+    std::env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned())
 }
 
 /// Describes what is wrong in a verdict that is not good.
@@ -96,27 +122,63 @@ fn engines(choice: Option<EngineChoice>) -> Vec<EngineChoice> {
     }
 }
 
-/// Measures, and says on a terminal what is being measured.
-fn watched(options: &Options) -> anyhow::Result<Report> {
-    let style =
-        ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}").expect("the template is right");
-    let bar = ProgressBar::new_spinner().with_style(style);
-    bar.enable_steady_tick(Duration::from_millis(200));
+/// Display of progress.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Shown {
+    Bar,
+    /// A line a section.
+    Lines,
+    Never,
+}
+
+impl Shown {
+    fn to(quiet: bool) -> Shown {
+        match io::stderr().is_terminal() {
+            _ if quiet => Shown::Never,
+            true => Shown::Bar,
+            false => Shown::Lines,
+        }
+    }
+}
+
+/// Measures, and says what is being measured.
+fn watched(options: &Options, shown: Shown) -> anyhow::Result<Report> {
+    let style = ProgressStyle::with_template("{bar:24} {percent:>3} %  {prefix} left  {wide_msg}");
+    let bar = match shown {
+        Shown::Bar => ProgressBar::new(1000),
+        _ => ProgressBar::hidden(),
+    };
+    let bar = bar.with_style(style.expect("the template is right"));
+    if shown == Shown::Bar {
+        bar.enable_steady_tick(Duration::from_millis(200));
+    }
     let last = RefCell::new(String::new());
-    let result = measure(options, &|what| {
-        if !what.is_empty() && *last.borrow() != what {
-            bar.set_message(what.to_owned());
-            last.replace(what.to_owned());
+    let result = measure(options, &|progress: &Progress| {
+        bar.set_position((1000.0 * progress.done) as u64);
+        bar.set_prefix(HumanDuration(progress.left).to_string());
+        let message = match progress.step.as_str() {
+            "" => progress.section.clone(),
+            step => format!("{}: {step}", progress.section),
+        };
+        bar.set_message(message);
+        if shown == Shown::Lines && *last.borrow() != progress.section {
+            last.replace(progress.section.clone());
+            tell!("{}", line(progress));
         }
         interrupt::check().is_ok()
     });
     bar.finish_and_clear();
     match result {
-        Err(ReportError::Stopped) => Err(Interrupted("nothing was left behind".to_owned()).into()),
         Err(ReportError::Engine(e)) => Err(e.into()), // with its exit code
         Err(ReportError::Recipe(e)) => Err(e.into()),
         other => Ok(other?),
     }
+}
+
+/// A line for the section that begins.
+fn line(progress: &Progress) -> String {
+    let (done, left) = (100.0 * progress.done, HumanDuration(progress.left));
+    format!("{done:3.0} % done, about {left} left: {}", progress.section)
 }
 
 fn write(folder: &PendingFolder, report: &Report) -> anyhow::Result<()> {
@@ -136,6 +198,17 @@ const REPORT: FolderMark =
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_say_what_is_measured_and_what_is_left() {
+        let progress = Progress {
+            section: "granada: 4. Fidelity to the method".to_owned(),
+            step: "any".to_owned(),
+            done: 0.256,
+            left: Duration::from_secs(61),
+        };
+        assert_eq!(line(&progress), " 26 % done, about 61 seconds left: granada: 4. Fidelity to the method");
+    }
 
     #[test]
     fn what_failed_is_named() {

@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::convergence::Convergence;
+use super::convergence::{Convergence, Source};
 use super::engines::Values;
 use super::estimate::quantile;
 use super::functions::{self, Functions};
@@ -72,19 +72,18 @@ pub struct Errors {
 
 pub(super) fn measure(
     bench: &Bench,
-    name: &str,
     recipe: &Recipe,
     convergence: &Convergence,
 ) -> Result<Accuracy, ReportError> {
-    let draws = Stream::named(bench.seed, "accuracy").draws(0..bench.effort.pick(50_000, 500_000, 1_000_000));
-    bench.say(&format!("{name}: {} draws beside those in f64", draws.count))?;
+    let draws = Stream::named(bench.seed, "accuracy").draws(0..bench.effort.pick(50_000, 200_000, 1_000_000));
+    bench.agenda.say(&format!("{} draws beside those in f64", draws.count))?;
     let judge = Judge::new(recipe, draws);
     let mut variants = Vec::new();
-    for (target, merit) in bench.targets.iter().zip(&convergence.merits) {
+    for (engine, target) in bench.targets.iter().enumerate() {
         if target.engine().is_none() {
             continue;
         }
-        bench.say(&format!("{name}: the values of {}", target.facts.name))?;
+        bench.agenda.say(&format!("the values of {}", target.facts.name))?;
         let (mut values, mut statuses) = (Vec::new(), Vec::new());
         target.runner(recipe)?.draw(bench, draws, &mut |part, took| {
             let Values::Single(part) = part else { return };
@@ -92,9 +91,10 @@ pub(super) fn measure(
             statuses.extend_from_slice(took);
         })?;
         let variant = judge.variant(&target.facts.name, &values, &statuses);
-        variants.push(Variant { nanoseconds: Some(merit.nanoseconds), ..variant });
+        let curve = convergence.curves.iter().find(|curve| curve.source == Source::Engine(engine));
+        variants.push(Variant { nanoseconds: curve.map(|curve| curve.merit.nanoseconds.median), ..variant });
     }
-    bench.say(&format!("{name}: variants"))?;
+    bench.agenda.say("variants")?;
     let (ours, statuses) = judge.scalar::<f32>();
     let half: Vec<f32> = ours.iter().map(|&v| f16::from_f32(v).to_f32()).collect();
     variants.push(Variant { bytes: 2, ..judge.variant("CPU, f32 rounded to f16", &half, &statuses) });

@@ -43,8 +43,8 @@ pub(super) struct Axis {
 pub(super) enum Style {
     /// Points joined by a line.
     Line,
-    /// A line without points.
-    Plain,
+    /// A bar of an error: a thin line without points.
+    Bar,
     /// A broken one.
     Dashed,
     /// One of dots.
@@ -121,7 +121,7 @@ impl Series {
             Style::Line => plots.push(line().with_stroke_width(1.8).into()),
             Style::Dashed => plots.push(line().with_stroke_width(1.3).with_dashed().into()),
             Style::Dotted => plots.push(line().with_stroke_width(1.6).with_dotted().into()),
-            Style::Plain => plots.push(line().with_stroke_width(1.8).into()),
+            Style::Bar => plots.push(line().with_stroke_width(1.3).into()),
             Style::Steps => {
                 let corners = points.windows(2).flat_map(|w| [w[0], (w[1].0, w[0].1)]);
                 let steps = LinePlot::new().with_data(corners.collect::<Vec<_>>()).with_color(self.colour);

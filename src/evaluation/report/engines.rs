@@ -1,10 +1,11 @@
 //! Subjects of measurement in one form: engines in f32, and the CPU in f64.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::estimate::Moments;
 use super::{Bench, ReportError};
 use crate::cpu::Kernel;
 use crate::draw_status::DrawStatus;
@@ -98,7 +99,7 @@ impl Runner<'_> {
         match self {
             Runner::Single(session) => {
                 let summary = session.draw(draws, |batch| {
-                    bench.say("")?;
+                    bench.agenda.beat()?;
                     let (values, statuses) = contents(&batch);
                     sink(Values::Single(values), statuses);
                     Ok::<_, ReportError>(())
@@ -108,7 +109,7 @@ impl Runner<'_> {
             Runner::Double(kernel) => {
                 let (mut values, mut statuses, mut attempts) = (Vec::new(), Vec::new(), 0);
                 for offset in (0..draws.count).step_by(WINDOW as usize) {
-                    bench.say("")?;
+                    bench.agenda.beat()?;
                     let part = draws.part(offset, WINDOW.min(draws.count - offset));
                     fill(kernel, part, &mut values, &mut statuses);
                     attempts += statuses.iter().map(|t: &DrawStatus| u64::from(t.attempts())).sum::<u64>();
@@ -124,6 +125,30 @@ impl Runner<'_> {
         let start = Instant::now();
         let attempts = self.draw(bench, draws, &mut |_, _| {})?;
         Ok((start.elapsed().as_secs_f64(), attempts))
+    }
+
+    /// Measures the time to draw a range without further work, and sums the draws.
+    pub(super) fn measure<'m>(
+        &mut self,
+        bench: &Bench,
+        draws: DrawRange,
+        mut moments: Moments<'m>,
+    ) -> Result<(f64, Moments<'m>), ReportError> {
+        let is_double = matches!(self, Runner::Double(_));
+        // Windows in f64 come one by one, so that the work between them can be told from them. An engine draws the next
+        // one meanwhile: it draws twice.
+        let mut seconds = if is_double { 0.0 } else { self.time(bench, draws)?.0 };
+        let (start, mut summing) = (Instant::now(), Duration::ZERO);
+        let attempts = self.draw(bench, draws, &mut |values, _| {
+            let start = Instant::now();
+            moments.add(values);
+            summing += start.elapsed();
+        })?;
+        if is_double {
+            seconds = (start.elapsed() - summing).as_secs_f64();
+        }
+        moments.attempts = attempts as f64;
+        Ok((seconds, moments))
     }
 }
 

@@ -102,11 +102,11 @@ fn time_builtin(@builtin(global_invocation_id) id: vec3<u32>) {
 ";
 
 pub(super) fn measure(bench: &Bench, recipe: &Recipe) -> Result<Vec<Functions>, ReportError> {
-    let candidates = bench.effort.pick(1 << 16, 1 << 18, 1 << 18);
+    let candidates = bench.effort.pick(1 << 16, 1 << 17, 1 << 18);
     let words = words(bench.seed, recipe.program().components(), candidates);
     let mut all = Vec::new();
     for (engine, target) in bench.targets.iter().enumerate() {
-        bench.say(&format!("functions of {}", target.facts.name))?;
+        bench.agenda.say(&format!("functions of {}", target.facts.name))?;
         let Some((results, nanoseconds)) = results(target, &words) else { continue };
         for ((name, polar), nanoseconds) in NAMES.into_iter().zip(results).zip(nanoseconds) {
             all.push(judge(engine, name, recipe, &words, &polar, nanoseconds));

@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use super::figures::{Figure, grouped, number};
-use super::{CheckRow, Effort, ModelReport, Report};
-use crate::evaluation::stress::Outcome;
-use crate::random::normal::radius;
+use super::figures::Figure;
+use super::tables;
+use super::{Effort, ModelReport, Report, Section};
 
 const STYLE: &str = "\
 body{font:16px/1.5 system-ui,sans-serif;color:#2b2f36;background:#fff;max-width:1340px;margin:2em auto;padding:0 1.5em}\
@@ -18,22 +17,29 @@ th,td{padding:.3em .7em;text-align:right;border-bottom:1px solid #e6e8eb;vertica
 white-space:nowrap}\
 th{background:#f4f5f7;font-weight:600}td.text,th.text{text-align:left;max-width:34em;\
 white-space:normal}\
+.unfinished{border:2px solid #b3261e;padding:0 1em;margin:1em 0;color:#b3261e}\
 .good{color:#00694e}.bad{color:#b3261e;font-weight:600}caption{text-align:left;padding:.4em 0;color:#5b626c}";
 
-/// Writes the page, with these figures in it.
+/// Writes the page, with these figures in it. Sections that were not measured are not on it.
 pub fn page(report: &Report, figures: &[Figure]) -> String {
     let mut html = String::new();
     let title = report.models.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
-    let title = escape(&title);
+    let mark = if report.finished { "" } else { "UNFINISHED: " };
+    let title = format!("{mark}Spectroll on {}", escape(&title));
     let _ = write!(
         html,
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width\"><title>Spectroll on {title}</title>\
-         <style>{STYLE}</style></head><body>\n<h1>Spectroll on {title}</h1>\n"
+         <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title>\
+         <style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n"
     );
+    html += &unfinished(report);
     html += &summary_html(report);
+    html += &tables::sections(report);
     for (index, model) in report.models.iter().enumerate() {
-        let plots = |section| plots(figures, section, Some(index));
+        let sections = model_sections(report, model);
+        if sections.is_empty() {
+            continue;
+        }
         let _ = write!(
             html,
             "<h1>{}</h1><p>{}s: {} bands at {} nm, {} components.</p>",
@@ -43,38 +49,84 @@ pub fn page(report: &Report, figures: &[Figure]) -> String {
             model.grid,
             model.components
         );
-        html += "<h2>1. Statistical error against run time</h2>\n\
-                 <p>What a user pays for: how long until the draws say what the distribution is. The error is the root \
-                 mean square distance from a reference in f64 with ten times the most draws; the reference’s own error \
-                 is shown, and nothing below it can be told.</p>";
-        html += &merits(report, model);
-        html += &plots(1);
-        html += "<h2>2. Numerical error against cost</h2>\n\
-                 <p>Each draw beside the one in f64 of the same random words, so that chance plays no part. Errors are of \
-                 the worst value of a draw; a flip is a draw for which rounding took another candidate.</p>";
-        html += &variants(model);
-        html += &functions(report, model);
-        html += &plots(2);
-        html += "<h2>3. Cost against difficulty</h2>\n\
-                 <p>Rejection makes unlikely spectra dear. Two ways to make them unlikely: more covariance, and a target \
-                 luminous reflectance near the largest that the model reaches.</p>";
-        html += &plots(3);
-        html += "<h2>4. Fidelity to the method</h2>\n\
-                 <p>What the components explain of the data, what the Gaussian makes of them, and what rejection makes of \
-                 the Gaussian.</p>";
-        html += &spreads(model);
-        html += &plots(4);
+        for (section, text) in sections {
+            html += &heading(section);
+            html += &text;
+            html += &plots(figures, section, Some(index));
+        }
     }
-    html += "<h1>All models</h1>\n<h2>5. Randomness</h2>";
-    html += &randomness(report);
-    html += &plots(figures, 5, None);
-    html += "<h2>6. Stiff and extreme cases</h2>\n\
-             <p>Each has one right answer: values within a bound, or a refusal with the reason. The error is relative to \
-             the largest mean and deviation of a band, or to the spectrum’s peak where there is a target, unless the \
-             result says otherwise.</p>";
-    html += &stress(report);
+    let sections = shared_sections(report);
+    if !sections.is_empty() {
+        html += "<h1>All models</h1>";
+    }
+    for (section, text) in sections {
+        html += &heading(section);
+        html += &text;
+        html += &plots(figures, section, None);
+    }
     html += "</body></html>\n";
     html
+}
+
+/// Says that a report is unfinished, and what it lacks.
+fn unfinished(report: &Report) -> String {
+    if report.finished {
+        return String::new();
+    }
+    let missing: String = report.missing.iter().map(|name| format!("<li>{}</li>", escape(name))).collect();
+    format!(
+        "<div class=\"unfinished\"><p><b>UNFINISHED.</b> The measurements were interrupted. These sections are \
+         missing:</p><ul>{missing}</ul></div>\n"
+    )
+}
+
+fn heading(section: Section) -> String {
+    format!("<h2>{}. {}</h2>\n", section.number(), section.title())
+}
+
+/// Text and tables of the sections of a model that were measured.
+fn model_sections(report: &Report, model: &ModelReport) -> Vec<(Section, String)> {
+    let mut all = Vec::new();
+    if let Some(measured) = &model.convergence {
+        let text = "<p>What a user pays for: how long until the draws say what the distribution is. The error is the root \
+                    mean square distance from a reference whose own error is a fifth of the smallest one expected. That \
+                    is shown, and nothing below it can be told.</p>";
+        let tables = tables::merits(report, measured) + &tables::rule(measured);
+        all.push((Section::Convergence, text.to_owned() + &tables));
+    }
+    if let Some(measured) = &model.accuracy {
+        let text = "<p>Each draw beside the one in f64 of the same random words, so that chance plays no part. Errors are \
+                    of the worst value of a draw; a flip is a draw for which rounding took another candidate.</p>";
+        let tables = tables::variants(measured) + &tables::functions(report, measured);
+        all.push((Section::Accuracy, text.to_owned() + &tables));
+    }
+    if model.difficulty.is_some() {
+        let text = "<p>Rejection makes unlikely spectra dear. Two ways to make them unlikely: more covariance, and a target \
+                    luminous reflectance near the largest that the model reaches.</p>";
+        all.push((Section::Difficulty, text.to_owned()));
+    }
+    if let Some(measured) = &model.fidelity {
+        let text = "<p>What the components explain of the data, what the Gaussian makes of them, what rejection makes of \
+                    the Gaussian, and how far the draws that are left are from the data.</p>";
+        let tables = tables::spreads(measured, model.components) + &tables::data(measured, model.kind);
+        all.push((Section::Fidelity, text.to_owned() + &tables));
+    }
+    all
+}
+
+/// Text and tables of the sections of all models that were measured.
+fn shared_sections(report: &Report) -> Vec<(Section, String)> {
+    let mut all = Vec::new();
+    if let Some(measured) = &report.randomness {
+        all.push((Section::Randomness, tables::randomness(report, measured)));
+    }
+    if let Some(measured) = &report.stress {
+        let text = "<p>Each has one right answer: values within a bound, or a refusal with the reason. The error is \
+                    relative to the largest mean and deviation of a band, or to the spectrum’s peak where there is a target, \
+                    unless the result says otherwise.</p>";
+        all.push((Section::Stress, text.to_owned() + &tables::stress(report, measured)));
+    }
+    all
 }
 
 fn summary_html(report: &Report) -> String {
@@ -86,6 +138,14 @@ fn summary_html(report: &Report) -> String {
     let mut rows = String::new();
     for engine in &report.engines {
         let _ = write!(rows, "<li><b>{}</b>: {}</li>", escape(&engine.name), escape(&engine.description));
+    }
+    // The peers are the same for all models.
+    let convergence = report.models.iter().find_map(|model| model.convergence.as_ref());
+    for peer in convergence.iter().flat_map(|measured| &measured.peers) {
+        let _ = write!(rows, "<li><b>{}</b>: {}</li>", escape(&peer.name), escape(&peer.description()));
+    }
+    for missing in convergence.iter().flat_map(|measured| &measured.missing_peers) {
+        let _ = write!(rows, "<li>left out: {}</li>", escape(missing));
     }
     let verdict = report.verdict();
     let class = if verdict.is_good() { "good" } else { "bad" };
@@ -102,7 +162,7 @@ fn summary_html(report: &Report) -> String {
     )
 }
 
-fn plots(figures: &[Figure], section: usize, model: Option<usize>) -> String {
+fn plots(figures: &[Figure], section: Section, model: Option<usize>) -> String {
     let mut html = String::from("<div class=\"plots\">\n");
     for figure in figures.iter().filter(|f| f.section == section && f.model == model) {
         let _ = writeln!(
@@ -117,285 +177,12 @@ fn plots(figures: &[Figure], section: usize, model: Option<usize>) -> String {
     html + "</div>\n"
 }
 
-/// Writes a table. The first `texts` columns are text.
-fn table(caption: &str, head: &[&str], texts: usize, rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let class = |i: usize| if i < texts { " class=\"text\"" } else { "" };
-    let mut html = format!("<table><caption>{caption}</caption><tr>");
-    for (i, cell) in head.iter().enumerate() {
-        let _ = write!(html, "<th{}>{cell}</th>", class(i));
-    }
-    html += "</tr>\n";
-    for row in rows {
-        html += "<tr>";
-        for (i, cell) in row.iter().enumerate() {
-            let _ = write!(html, "<td{}>{cell}</td>", class(i));
-        }
-        html += "</tr>\n";
-    }
-    html + "</table>\n"
-}
-
-fn merits(report: &Report, model: &ModelReport) -> String {
-    let best = model.convergence.merits.iter().map(|m| m.error2_seconds.value).fold(f64::INFINITY, f64::min);
-    let rows = model.convergence.merits.iter().map(|m| {
-        let interval = m.error2_seconds;
-        vec![
-            escape(&report.engines[m.engine].name),
-            number(m.first_draw),
-            format!("{:.1}", m.nanoseconds),
-            format!("{:.3} ({:.3} to {:.3})", m.slope.value, m.slope.low, m.slope.high),
-            format!("{} ({} to {})", number(interval.value), number(interval.low), number(interval.high)),
-            format!("{:.2}", interval.value / best),
-        ]
-    });
-    let draws = model.convergence.points.iter().map(|p| p.draws).max().unwrap_or(0);
-    table(
-        &format!(
-            "Error² × time of the mean spectrum at {} draws: the one figure that does not depend on how many draws are \
-             made. Half of it is half the time for the same error.",
-            grouped(draws)
-        ),
-        &["engine", "first draw (s)", "ns a draw", "slope", "error² × time (s)", "relative to the best"],
-        1,
-        rows,
-    )
-}
-
-fn variants(model: &ModelReport) -> String {
-    let triple = |e: super::Errors| format!("{}<br>{}<br>{}", number(e.max), number(e.p999), number(e.rms));
-    let rows = model.accuracy.variants.iter().map(|v| {
-        vec![
-            escape(&v.name),
-            v.nanoseconds.map_or("–".to_owned(), |ns| format!("{ns:.1}")),
-            v.bytes.to_string(),
-            number(v.flips_per_million),
-            triple(v.spectra),
-            triple(v.ulps),
-            triple(v.weights),
-            triple(v.luminance),
-            triple(v.xyz),
-            format!("{} ± {}", number(v.bias), number(v.bias_error)),
-        ]
-    });
-    table(
-        &format!(
-            "{} draws. In each cell: the largest, what one draw in a thousand exceeds, the root mean square. Units in the \
-             last place are of the value itself, and many where a value is close to 0; the absolute error is what a user \
-             sees. Only engines have a cost: the variants are made one draw at a time. Besides, normals of 24-bit uniforms \
-             end at {:.2} deviations, ours at {:.2}.",
-            grouped(model.accuracy.draws),
-            radius(0x80),
-            radius(0)
-        ),
-        &[
-            "draws",
-            "ns a draw",
-            "bytes a value",
-            "flips per million",
-            "spectrum",
-            "units in the last place",
-            "weights",
-            "luminance",
-            "XYZ",
-            "bias of a band",
-        ],
-        1,
-        rows,
-    )
-}
-
-fn functions(report: &Report, model: &ModelReport) -> String {
-    let rows = model.accuracy.functions.iter().map(|f| {
-        vec![
-            escape(&report.engines[f.engine].name),
-            f.name.to_owned(),
-            format!("{:.2}", f.nanoseconds),
-            number(f.radius),
-            number(f.circle),
-            number(f.normal),
-            number(f.spectrum),
-            number(f.flips_per_million),
-        ]
-    });
-    table(
-        "The functions of Box-Muller alone, all else in f64: largest errors. A flip is a candidate that is accepted and \
-         should not be, or the other way round.",
-        &[
-            "engine",
-            "functions",
-            "ns for two normals",
-            "radius",
-            "sine, cosine",
-            "normal",
-            "spectrum",
-            "flips per million",
-        ],
-        2,
-        rows,
-    )
-}
-
-fn spreads(model: &ModelReport) -> String {
-    let weights: Vec<String> = (1..=model.components).map(|j| format!("weight {j}")).collect();
-    let head: Vec<&str> = ["of", "spectra"]
-        .into_iter()
-        .chain(weights.iter().map(String::as_str))
-        .chain(["largest correlation"])
-        .collect();
-    let rows = model.fidelity.spreads.iter().map(|s| {
-        let count = s.count.map_or("formula".to_owned(), grouped);
-        let deviations = s.deviations.iter().map(|d| format!("{d:.4}"));
-        [s.name.clone(), count].into_iter().chain(deviations).chain([number(s.correlation)]).collect()
-    });
-    table("Standard deviations of the weights.", &head, 1, rows)
-}
-
-fn randomness(report: &Report) -> String {
-    let randomness = &report.randomness;
-    let mut html = format!(
-        "<p>The generator gives {} of {} known answers of Random123. ",
-        randomness.known_answers[0], randomness.known_answers[1]
-    );
-    for (engine, same, all) in &randomness.same_bits {
-        let _ = write!(
-            html,
-            "{} of {} draws of {} have the bits of the CPU’s in f32. ",
-            grouped(*same),
-            grouped(*all),
-            escape(&report.engines[*engine].name)
-        );
-    }
-    html += "</p>";
-    let groups = randomness.groups.iter().map(|g| {
-        let smallest = g.p_values.iter().copied().fold(1.0, f64::min);
-        let below = g.p_values.iter().filter(|&&p| p < 0.05).count();
-        vec![
-            g.name.to_owned(),
-            g.p_values.len().to_string(),
-            number(smallest),
-            number((smallest * g.p_values.len() as f64).min(1.0)),
-            format!("{:.1} %", 100.0 * below as f64 / g.p_values.len() as f64),
-        ]
-    });
-    html += &table(
-        &format!(
-            "The generator’s normals in f32: {} draws of each of {} seeds.",
-            grouped(randomness.draws),
-            randomness.seeds
-        ),
-        &["comparison", "number", "smallest p", "times their number", "p below 0.05"],
-        1,
-        groups,
-    );
-    html += &checks(report);
-    html
-}
-
-/// Writes the checks of draws, a row for each scenario and check, a column for each engine.
-fn checks(report: &Report) -> String {
-    let randomness = &report.randomness;
-    let mut engines: Vec<usize> = randomness.checks.iter().map(|c| c.engine).collect();
-    engines.sort_unstable();
-    engines.dedup();
-    let names: Vec<String> =
-        engines.iter().map(|&e| format!("{}: p", escape(&report.engines[e].name))).collect();
-    let head =
-        ["draws of", "check", "compares", "comparisons"].into_iter().chain(names.iter().map(String::as_str));
-    let first = randomness.checks.iter().filter(|c| c.engine == engines[0]);
-    let rows = first.map(|c| {
-        let cells = engines.iter().map(|&engine| {
-            let same = |other: &&CheckRow| {
-                (other.engine, &other.scenario, other.check) == (engine, &c.scenario, c.check)
-            };
-            randomness.checks.iter().find(same).map_or(String::new(), verdict)
-        });
-        let texts = [escape(&c.scenario), c.check.to_owned(), powers(c.compares), c.comparisons.to_string()];
-        texts.into_iter().chain(cells).collect()
-    });
-    table(
-        &format!(
-            "Draws beside those of an independent sampler: {} draws each. A check of sound draws raises a false alarm once \
-             in {} times; p is the probability that they look as bad in any of the comparisons. A check without \
-             comparisons leaves nothing to chance.{}",
-            grouped(randomness.check_draws),
-            number(1.0 / randomness.false_alarms),
-            smallest(report)
-        ),
-        &head.collect::<Vec<_>>(),
-        3,
-        rows,
-    )
-}
-
-fn verdict(check: &CheckRow) -> String {
-    match &check.alarm {
-        Some(alarm) => format!("<span class=\"bad\">{}</span>", escape(alarm)),
-        None if check.comparisons > 0 => number(check.p),
-        None => "<span class=\"good\">sound</span>".to_owned(),
-    }
-}
-
-/// Writes the smallest errors that the checks see.
-fn smallest(report: &Report) -> String {
-    let Some(s) = report.randomness.smallest else { return String::new() };
-    format!(
-        " The smallest errors that they see, in all but one of 1,000 cases: {:.1} % of the acceptance, {:.3} standard \
-         deviations of a mean, {:.3} of a correlation, {:.1} % of a variance, {:.3} of a distribution function ({:.3} where \
-         there is a formula), {:.3} of a correlation of neighbours or streams.",
-        100.0 * s.acceptance,
-        s.mean,
-        s.correlation,
-        100.0 * s.variance,
-        s.distribution,
-        s.gaussian,
-        s.independence
-    )
-}
-
-fn stress(report: &Report) -> String {
-    let Some(first) = report.stress.first() else { return String::new() };
-    let mut head = vec!["case", "what could break", "result"];
-    let names: Vec<String> = report
-        .stress
-        .iter()
-        .flat_map(|run| {
-            let name = &report.engines[run.engine].name;
-            [format!("{name}: error (bound)"), format!("{name}: time (s)")]
-        })
-        .collect();
-    head.extend(names.iter().map(String::as_str));
-    let rows = first.outcomes.iter().enumerate().map(|(i, outcome)| {
-        let all = || report.stress.iter().map(|run| &run.outcomes[i]);
-        let wrong = all().find(|o| !o.passed).unwrap_or(outcome);
-        let class = if wrong.passed { "good" } else { "bad" };
-        let cells = all().flat_map(|o| [error(o), format!("{:.2}", o.seconds)]);
-        let texts = [
-            powers(outcome.name),
-            powers(outcome.could_break),
-            format!("<span class=\"{class}\">{}</span>", powers(&wrong.result)),
-        ];
-        texts.into_iter().chain(cells).collect()
-    });
-    let left_out = match report.effort {
-        Effort::Quick => " In a quick report only the CPU runs them.",
-        _ => "",
-    };
-    table(&format!("{} cases.{left_out}", first.outcomes.len()), &head, 3, rows)
-}
-
-fn error(outcome: &Outcome) -> String {
-    match (outcome.error, outcome.bound) {
-        (Some(error), Some(bound)) => format!("{} ({bound:.0e})", number(error)),
-        _ => "–".to_owned(),
-    }
-}
-
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Raises the powers in a text: 10^-9.
-fn powers(text: &str) -> String {
+pub(super) fn powers(text: &str) -> String {
     let text = escape(text);
     let mut parts = text.split('^');
     let mut html = parts.next().unwrap_or_default().to_owned();

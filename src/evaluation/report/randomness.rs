@@ -71,10 +71,10 @@ pub struct CheckRow {
 
 pub(super) fn measure(bench: &Bench, models: &[(String, Model)]) -> Result<Randomness, ReportError> {
     let known = KNOWN_ANSWERS.iter().filter(|&&(counter, key, output)| philox(counter, key) == output);
-    let (seeds, draws) = bench.effort.pick((6, 1 << 15), (40, 1 << 17), (100, 1 << 18));
+    let (seeds, draws) = bench.effort.pick((6, 1 << 15), (20, 1 << 16), (100, 1 << 18));
     let mut groups: Vec<GroupRow> = Vec::new();
     for seed in 0..seeds {
-        bench.say(&format!("the generator under seed {seed} of {seeds}"))?;
+        bench.agenda.say(&format!("the generator under seed {seed} of {seeds}"))?;
         for (i, group) in
             uniformity(bench.seed.wrapping_add(2 * seed), NORMALS, draws).into_iter().enumerate()
         {
@@ -85,7 +85,7 @@ pub(super) fn measure(bench: &Bench, models: &[(String, Model)]) -> Result<Rando
         }
     }
     let all: Vec<f64> = groups.iter().flat_map(|g| g.p_values.iter().copied()).collect();
-    let check_draws = bench.effort.pick(1 << 14, 1 << 17, 1 << 18);
+    let check_draws = bench.effort.pick(1 << 14, 1 << 16, 1 << 18);
     let (checks, smallest) = checks(bench, models, check_draws)?;
     Ok(Randomness {
         known_answers: [known.count(), KNOWN_ANSWERS.len()],
@@ -125,11 +125,11 @@ fn checks(
         if Recipe::builder(&scenario.model).covariance_scale(scenario.scale).build().is_err() {
             continue;
         }
-        bench.say(&format!("the distribution of {}", scenario.name))?;
+        bench.agenda.say(&format!("the distribution of {}", scenario.name))?;
         let oracle = statistics::oracle(&scenario, bench.seed.wrapping_add(number), draws);
         for (index, target) in bench.targets.iter().enumerate() {
             let Some(engine) = target.engine() else { continue };
-            bench.say(&format!("the distribution of {} on {}", scenario.name, target.facts.name))?;
+            bench.agenda.say(&format!("the distribution of {} on {}", scenario.name, target.facts.name))?;
             let failed = std::cell::RefCell::new(None);
             let sampler = |stream, first, count| {
                 Sample::of_engine(&scenario, engine, stream, first, count).unwrap_or_else(|e| {

@@ -5,7 +5,8 @@ use std::fmt::{self, Write};
 use serde::Serialize;
 
 use super::Report;
-use super::figures::number;
+use super::figures::times_text;
+use super::format::number;
 
 /// Counts of right answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -26,27 +27,34 @@ impl Verdict {
 }
 
 impl fmt::Display for Verdict {
+    /// Counts what was judged.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let [cases, checks, answers] = [self.cases, self.checks, self.answers];
-        write!(
-            f,
-            "{} of {} stiff and extreme cases have their right answer; {} of {} checks of distributions raise no alarm; \
-             {} of {} known answers of the generator",
-            cases[0], cases[1], checks[0], checks[1], answers[0], answers[1]
-        )
+        let parts = [
+            (self.cases, "stiff and extreme cases have their right answer"),
+            (self.checks, "checks of distributions raise no alarm"),
+            (self.answers, "known answers of the generator"),
+        ];
+        let judged = parts.iter().filter(|([_, all], _)| *all > 0);
+        let told: Vec<_> = judged.map(|([good, all], what)| format!("{good} of {all} {what}")).collect();
+        if told.is_empty() { write!(f, "no answers were judged") } else { write!(f, "{}", told.join("; ")) }
     }
 }
 
 impl Report {
-    /// Counts the right answers.
+    /// Counts the right answers among all that were judged.
     pub fn verdict(&self) -> Verdict {
-        let outcomes = || self.stress.iter().flat_map(|run| &run.outcomes);
-        let checks = &self.randomness.checks;
+        let outcomes = || self.stress.iter().flatten().flat_map(|run| &run.outcomes);
+        let checks = || self.randomness.iter().flat_map(|randomness| &randomness.checks);
         Verdict {
             cases: [outcomes().filter(|o| o.passed).count(), outcomes().count()],
-            checks: [checks.iter().filter(|c| c.alarm.is_none()).count(), checks.len()],
-            answers: self.randomness.known_answers,
+            checks: [checks().filter(|c| c.alarm.is_none()).count(), checks().count()],
+            answers: self.randomness.as_ref().map_or([0, 0], |randomness| randomness.known_answers),
         }
+    }
+
+    /// Number of sections that were measured, and of all.
+    pub fn measured(&self) -> [usize; 2] {
+        [self.sections.len() - self.missing.len(), self.sections.len()]
     }
 
     /// Writes the outcome in a few lines for a terminal.
@@ -54,17 +62,23 @@ impl Report {
         let mut text = String::new();
         for model in &self.models {
             let _ = writeln!(text, "{}: {} bands, {} components", model.name, model.bands, model.components);
-            for merit in &model.convergence.merits {
-                let _ = writeln!(
-                    text,
-                    "  {:<24} {:>8.1} ns a draw, error² × time {} (slope {:.3})",
-                    self.engines[merit.engine].name,
-                    merit.nanoseconds,
-                    number(merit.error2_seconds.value),
-                    merit.slope.value
-                );
+            for measured in &model.convergence {
+                for curve in &measured.curves {
+                    let merit = curve.merit;
+                    let _ = writeln!(
+                        text,
+                        "  {:<24} {:>8.1} ns a draw, {:>5} times as long for the same error (slope {:.3})",
+                        self.source_name(measured, curve.source),
+                        merit.nanoseconds.median,
+                        times_text(merit.relative_time.median),
+                        merit.slope.value
+                    );
+                }
+                for missing in &measured.missing_peers {
+                    let _ = writeln!(text, "  left out: {missing}");
+                }
             }
-            for variant in &model.accuracy.variants {
+            for variant in model.accuracy.iter().flat_map(|accuracy| &accuracy.variants) {
                 let _ = writeln!(
                     text,
                     "  {:<42} error {} at most, {} flips per million",
@@ -75,13 +89,28 @@ impl Report {
             }
         }
         let _ = writeln!(text, "{}", self.verdict());
-        for outcome in self.stress.iter().flat_map(|run| &run.outcomes).filter(|o| !o.passed) {
+        for outcome in self.stress.iter().flatten().flat_map(|run| &run.outcomes).filter(|o| !o.passed) {
             let _ = writeln!(text, "WRONG: {}: {}", outcome.name, outcome.result);
         }
-        for check in self.randomness.checks.iter().filter(|c| c.alarm.is_some()) {
+        let checks = self.randomness.iter().flat_map(|randomness| &randomness.checks);
+        for check in checks.filter(|c| c.alarm.is_some()) {
             let alarm = check.alarm.as_deref().unwrap_or_default();
             let _ = writeln!(text, "ALARM: {}, {}: {alarm}", check.scenario, check.check);
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_judged_answers_are_counted() {
+        let none = Verdict { cases: [0, 0], checks: [0, 0], answers: [0, 0] };
+        assert_eq!(none.to_string(), "no answers were judged");
+        let some = Verdict { answers: [3, 3], ..none };
+        assert_eq!(some.to_string(), "3 of 3 known answers of the generator");
+        assert!(some.is_good() && !Verdict { cases: [1, 2], ..some }.is_good());
     }
 }
