@@ -22,7 +22,10 @@ fn an_interrupted_report_keeps_what_is_done() {
         .unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     let first = lines.next().unwrap();
-    assert!(first.contains("granada: 1. Statistical error against run time") && first.contains(" left"), "{first}");
+    assert!(
+        first.contains("granada: 1. Statistical error against run time") && first.contains(" left"),
+        "{first}"
+    );
     let second = lines.next().unwrap();
     assert!(second.contains("granada: 2. Numerical error against cost"), "{second}");
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
@@ -40,7 +43,11 @@ fn an_interrupted_report_keeps_what_is_done() {
     assert!(!page.contains("<h2>6. Stiff") && !page.contains("cases have their right answer"));
     let json: Value = serde_json::from_str(&read("report.json")).unwrap();
     assert_eq!((&json["finished"], &json["stress"]), (&Value::Bool(false), &Value::Null));
-    let missing: Vec<&str> = json["missing"].as_array().unwrap().iter().map(|m| m.as_str().unwrap()).collect();
+    let missing: Vec<&str> =
+        json["missing"].as_array().unwrap().iter().map(|m| m.as_str().unwrap()).collect();
     assert_eq!(missing.last(), Some(&"6. Stiff and extreme cases"));
-    assert!(json["models"][0]["convergence"]["curves"][0]["points"][0]["seconds"]["median"].as_f64().unwrap() > 0.0);
+    assert!(
+        json["models"][0]["convergence"]["curves"][0]["points"][0]["seconds"]["median"].as_f64().unwrap()
+            > 0.0
+    );
 }

@@ -104,7 +104,11 @@ pub(super) fn measure(bench: &Bench, recipe: &Recipe) -> Result<Convergence, Rep
             Ok(peer) => {
                 peers.push(peer.facts.clone());
                 let index = peers.len() - 1;
-                turns.makers.push(Maker::new(Source::Peer(index), peer.first_draw, Drawing::Peer(Box::new(peer))));
+                turns.makers.push(Maker::new(
+                    Source::Peer(index),
+                    peer.first_draw,
+                    Drawing::Peer(Box::new(peer)),
+                ));
             }
             Err(reason) => missing_peers.push(reason),
         }
@@ -175,7 +179,8 @@ impl<'a> Maker<'a> {
             self.sizes.push(Replicates { draws, seconds: Vec::new(), estimates: Vec::new() });
         }
         let size = self.sizes.iter_mut().find(|size| size.draws == draws).expect("it was made once");
-        let (stream, number) = (Stream::named(bench.seed, &format!("{draws} draws")), size.seconds.len() as u64);
+        let (stream, number) =
+            (Stream::named(bench.seed, &format!("{draws} draws")), size.seconds.len() as u64);
         let range = stream.draws(number * draws..(number + 1) * draws);
         let (seconds, moments) = match &mut self.drawing {
             Drawing::Engine(runner) => {
@@ -237,7 +242,8 @@ impl Turns<'_, '_> {
                     round_seconds: seconds.map(|s| 2.5 * median(&s.seconds)).sum(),
                 }
             };
-            let longest = makers().max_by_key(|maker| maker.sizes.len()).expect("the CPU in f64 is always there");
+            let longest =
+                makers().max_by_key(|maker| maker.sizes.len()).expect("the CPU in f64 is always there");
             let sizes: Vec<Size> = longest.sizes.iter().map(size).collect();
             let Some((draws, rounds)) = rule.next(&sizes, self.bench.agenda.left()) else {
                 return Ok(Stop::Time);
@@ -254,7 +260,8 @@ impl Turns<'_, '_> {
         };
         if draws > 100_000 {
             let drawn = self.makers.iter().filter(|maker| goes_on(maker)).map(|maker| maker.forecast(draws));
-            let seconds = self.reference.forecast(draws) + 2.5 * rule.least_replicates as f64 * drawn.sum::<f64>();
+            let seconds =
+                self.reference.forecast(draws) + 2.5 * rule.least_replicates as f64 * drawn.sum::<f64>();
             if !self.makers.iter().any(goes_on) || seconds > GROWTH * self.bench.agenda.left() {
                 return Ok(false);
             }
@@ -266,11 +273,17 @@ impl Turns<'_, '_> {
     }
 
     /// Lets makers take turns.
-    fn rounds(&mut self, draws: u64, rounds: usize, joins: &dyn Fn(&Maker) -> bool) -> Result<(), ReportError> {
+    fn rounds(
+        &mut self,
+        draws: u64,
+        rounds: usize,
+        joins: &dyn Fn(&Maker) -> bool,
+    ) -> Result<(), ReportError> {
         self.bench.agenda.say(&format!("replicates of {draws} draws"))?;
         let joins: Vec<bool> = self.makers.iter().map(joins).collect();
         for _ in 0..rounds {
-            for (maker, _) in self.makers.iter_mut().zip(&joins).filter(|(maker, joins)| **joins && maker.failed.is_none())
+            for (maker, _) in
+                self.makers.iter_mut().zip(&joins).filter(|(maker, joins)| **joins && maker.failed.is_none())
             {
                 maker.replicate(self.bench, self.recipe, draws)?;
             }
@@ -319,16 +332,22 @@ fn merit(maker: &Maker, first: &[Replicates], reference: &Estimate, reference_dr
     });
     let most = maker.sizes.last().expect("there are numbers of draws");
     // The square of an error is of the draws and of the reference.
-    let draws: Vec<f64> =
-        maker.sizes.iter().map(|size| 1.0 / (1.0 / size.draws as f64 + 1.0 / reference_draws as f64)).collect();
+    let draws: Vec<f64> = maker
+        .sizes
+        .iter()
+        .map(|size| 1.0 / (1.0 / size.draws as f64 + 1.0 / reference_draws as f64))
+        .collect();
     let error2_seconds = bootstrap(&lengths, |picks| {
         let squares = errors.iter().zip(&draws).zip(picks);
-        let squares = squares.flat_map(|((errors, n), picks)| picks.iter().map(move |&i| n * errors[i] * errors[i]));
-        let seconds = picks.last().expect("there is a size").iter().map(|&i| most.seconds[i]).collect::<Vec<_>>();
+        let squares =
+            squares.flat_map(|((errors, n), picks)| picks.iter().map(move |&i| n * errors[i] * errors[i]));
+        let seconds =
+            picks.last().expect("there is a size").iter().map(|&i| most.seconds[i]).collect::<Vec<_>>();
         squares.sum::<f64>() / lengths.iter().sum::<usize>() as f64 * median(&seconds) / most.draws as f64
     });
     let pairs = first.iter().rev().find(|size| size.draws <= most.draws).expect("all begin alike");
-    let own = maker.sizes.iter().find(|size| size.draws == pairs.draws).expect("a smaller one was made before");
+    let own =
+        maker.sizes.iter().find(|size| size.draws == pairs.draws).expect("a smaller one was made before");
     let ratios: Vec<f64> = own.seconds.iter().zip(&pairs.seconds).map(|(a, b)| a / b).collect();
     Merit {
         first_draw: maker.first_draw,

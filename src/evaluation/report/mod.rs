@@ -291,7 +291,8 @@ fn measure_sections(
 fn stress(bench: &Bench) -> Result<Vec<StressRun>, ReportError> {
     let mut runs = Vec::new();
     let cases: Vec<_> = stress::cases().collect();
-    let engines: Vec<_> = bench.targets.iter().enumerate().filter_map(|(i, t)| Some((i, t.engine()?))).collect();
+    let engines: Vec<_> =
+        bench.targets.iter().enumerate().filter_map(|(i, t)| Some((i, t.engine()?))).collect();
     for (done, &(index, engine)) in engines.iter().enumerate() {
         let mut outcomes = Vec::new();
         let share = bench.agenda.left() / (engines.len() - done) as f64;

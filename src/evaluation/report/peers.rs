@@ -33,7 +33,8 @@ pub struct PeerFacts {
 impl PeerFacts {
     /// Describes it in one line.
     pub fn description(&self) -> String {
-        let threads = if self.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", self.threads) };
+        let threads =
+            if self.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", self.threads) };
         format!("{} {} ({threads}), Python {}", self.name, self.version, self.python)
     }
 }
@@ -132,7 +133,8 @@ impl Peer {
                     if self.answers.read_exact(&mut self.bytes).is_err() {
                         return failed("it ended early");
                     }
-                    let values: Vec<f32> = self.bytes.as_chunks::<4>().0.iter().map(|b| f32::from_ne_bytes(*b)).collect();
+                    let values: Vec<f32> =
+                        self.bytes.as_chunks::<4>().0.iter().map(|b| f32::from_ne_bytes(*b)).collect();
                     moments.add(Values::Single(&values));
                 }
                 Some(Header::End { seconds, candidates }) if moments.draws == draws => {

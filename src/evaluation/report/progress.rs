@@ -185,11 +185,6 @@ impl<'a> Agenda<'a> {
         self.sections.borrow()[self.current.get()].budget - self.began.get().elapsed().as_secs_f64()
     }
 
-    /// Time that the section at work may take, seconds.
-    pub(super) fn budget(&self) -> f64 {
-        self.sections.borrow()[self.current.get()].budget
-    }
-
     fn progress(&self) -> Progress {
         let (sections, current) = (self.sections.borrow(), self.current.get());
         let Some(section) = sections.get(current) else {

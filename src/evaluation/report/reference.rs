@@ -97,7 +97,13 @@ impl<'a> Growing<'a> {
         {
             let mut runner = self.engine.runner(self.recipe)?;
             while self.rough.draws < all {
-                let part = sums(bench, &mut runner, self.recipe, self.stream, self.rough.draws..self.rough.draws + PART)?;
+                let part = sums(
+                    bench,
+                    &mut runner,
+                    self.recipe,
+                    self.stream,
+                    self.rough.draws..self.rough.draws + PART,
+                )?;
                 self.parts.push(part.estimate());
                 self.rough.merge(&part);
             }
@@ -130,7 +136,8 @@ impl<'a> Growing<'a> {
         let apart: Vec<f64> = self.parts.iter().map(|part| part.errors(&whole)[1]).collect();
         let norm = |v: &nalgebra::DVector<f64>| v.norm() / (v.len() as f64).sqrt();
         let count = self.apart.len() as f64;
-        let shift = self.apart.iter().fold(nalgebra::DVector::zeros(estimate.mean.len()), |a, b| a + b) / count;
+        let shift =
+            self.apart.iter().fold(nalgebra::DVector::zeros(estimate.mean.len()), |a, b| a + b) / count;
         let strays: Vec<f64> = self.apart.iter().map(|apart| norm(&(apart - &shift))).collect();
         let correction_error = root_mean_square(&strays) / (count - 1.0).sqrt();
         let (deviation, p) = (self.rough.deviation(), estimate.acceptance);

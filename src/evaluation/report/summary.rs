@@ -62,7 +62,7 @@ impl Report {
         let mut text = String::new();
         for model in &self.models {
             let _ = writeln!(text, "{}: {} bands, {} components", model.name, model.bands, model.components);
-            for measured in &model.convergence {
+            if let Some(measured) = &model.convergence {
                 for curve in &measured.curves {
                     let merit = curve.merit;
                     let _ = writeln!(

@@ -6,7 +6,8 @@ use super::figures::times_text;
 use super::format::{duration, grouped, number};
 use super::page::{escape, powers};
 use super::{
-    Accuracy, CheckRow, Convergence, DataComparison, Errors, Fidelity, Quartiles, Randomness, Report, Stop, StressRun,
+    Accuracy, CheckRow, Convergence, DataComparison, Errors, Fidelity, Quartiles, Randomness, Report, Stop,
+    StressRun,
 };
 use crate::dataset::SpectrumKind;
 use crate::evaluation::stress::Outcome;
@@ -69,7 +70,15 @@ pub(super) fn merits(report: &Report, convergence: &Convergence) -> String {
              and products their 95 % intervals.",
             escape(first)
         ),
-        &["draws by", "first draw (s)", "most draws", "ns a draw", "time for the same error", "slope", "error² × time (s)"],
+        &[
+            "draws by",
+            "first draw (s)",
+            "most draws",
+            "ns a draw",
+            "time for the same error",
+            "slope",
+            "error² × time (s)",
+        ],
         1,
         rows,
     )
@@ -348,7 +357,8 @@ fn smallest(randomness: &Randomness) -> String {
 pub(super) fn stress(report: &Report, runs: &[StressRun]) -> String {
     let mut head = vec!["case", "what could break", "result"];
     let name = |run: &StressRun| &report.engines[run.engine].name;
-    let columns = runs.iter().flat_map(|run| ["error (bound)", "time (s)"].map(|of| format!("{}: {of}", name(run))));
+    let columns =
+        runs.iter().flat_map(|run| ["error (bound)", "time (s)"].map(|of| format!("{}: {of}", name(run))));
     let columns: Vec<String> = columns.map(|column| escape(&column)).collect();
     head.extend(columns.iter().map(String::as_str));
     // All run the same cases in the same order, some fewer of them.
@@ -368,7 +378,8 @@ pub(super) fn stress(report: &Report, runs: &[StressRun]) -> String {
         texts.into_iter().chain(cells).collect()
     });
     let fewer = runs.iter().filter(|run| run.outcomes.len() < run.cases);
-    let fewer = fewer.map(|run| format!(" The time sufficed for {} by {}.", run.outcomes.len(), escape(name(run))));
+    let fewer =
+        fewer.map(|run| format!(" The time sufficed for {} by {}.", run.outcomes.len(), escape(name(run))));
     table(&format!("{} cases.{}", longest.cases, fewer.collect::<String>()), &head, 3, rows)
 }
 

@@ -54,7 +54,8 @@ impl Errors<'_> {
         let (mut lines, mut bars) = (Vec::new(), Vec::new());
         for curve in &convergence.curves {
             let colour = self.colour(curve);
-            let points: Vec<&Point> = curve.points.iter().filter(|p| p.errors[quantity].value > 0.0).collect();
+            let points: Vec<&Point> =
+                curve.points.iter().filter(|p| p.errors[quantity].value > 0.0).collect();
             let (Some(first), Some(last)) = (points.first(), points.last()) else { continue };
             let (seconds, error) = (last.seconds.median, last.errors[quantity].value);
             let guide = [first.seconds.median, seconds].map(|t| (t, error * (seconds / t).sqrt()));
@@ -75,7 +76,12 @@ impl Errors<'_> {
         let values: Vec<_> = series.iter().flat_map(|s| s.points.iter()).copied().collect();
         let (low, high) = values.iter().fold((f64::INFINITY, 0f64), |(a, b), p| (a.min(p.0), b.max(p.0)));
         let own = convergence.reference.errors[quantity];
-        series.push(Series::new("error of the reference", GUIDE, Style::Dotted, vec![(low, own), (high, own)]));
+        series.push(Series::new(
+            "error of the reference",
+            GUIDE,
+            Style::Dotted,
+            vec![(low, own), (high, own)],
+        ));
         let chart = Chart {
             title: format!("Error of the {what} against run time"),
             x: Axis::decades("run time (s)", values.iter().map(|p| p.0)),
@@ -125,7 +131,11 @@ impl Errors<'_> {
             .map(|curve| {
                 let times = curve.merit.relative_time;
                 let [low, high] = [times.low, times.high].map(times_text);
-                format!("{} takes {} ({low} to {high}) times as long", self.name(curve), times_text(times.median))
+                format!(
+                    "{} takes {} ({low} to {high}) times as long",
+                    self.name(curve),
+                    times_text(times.median)
+                )
             })
             .collect();
         if told.is_empty() {

@@ -233,7 +233,13 @@ impl Drawing<'_> {
         let see = "Judged before it is scaled, a spectrum can leave the physical afterwards: rare for dark targets, the \
                    rule for light ones. Every draw that does is counted."
             .to_owned();
-        Some(self.figure("above-one", Section::Fidelity, &chart, see, &format!("{} draws a point", grouped(draws))))
+        Some(self.figure(
+            "above-one",
+            Section::Fidelity,
+            &chart,
+            see,
+            &format!("{} draws a point", grouped(draws)),
+        ))
     }
 }
 
