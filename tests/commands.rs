@@ -213,7 +213,12 @@ fn take(step: &Step, folder: &Path) -> Result<(), String> {
 
 fn run(arguments: &[String], output: Option<&str>, folder: &Path) -> Result<(), String> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_spectroll"));
-    command.args(arguments).current_dir(folder).envs(SLURM);
+    command.args(arguments).current_dir(folder);
+    // Of Kubernetes where the number of jobs is given, as only it needs it.
+    match arguments.iter().any(|argument| argument.starts_with("auto/")) {
+        true => command.env("JOB_COMPLETION_INDEX", "0"),
+        false => command.envs(SLURM),
+    };
     let written = finish(&mut command, &format!("spectroll {}", arguments.join(" ")))?;
     output.map_or(Ok(()), |name| fs::write(folder.join(name), written).map_err(|e| format!("{name}: {e}")))
 }
