@@ -178,7 +178,7 @@ fn the_version_has_the_commit_where_it_is_known() {
 fn a_fit_takes_a_share_of_the_variance_and_a_scale() {
     let folder = tempfile::tempdir().unwrap();
     let (_, said) = succeeds(folder.path(), "fit munsell vrhel -k 99% -o share.json");
-    let model = |file: &str| Model::load(&folder.path().join(file)).unwrap();
+    let model = |file: &str| Model::load(folder.path().join(file)).unwrap();
     let k = model("share.json").components();
     assert!(said.contains(&format!("{k} components explain")), "{said}");
     let explained = |k: usize| {

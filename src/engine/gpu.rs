@@ -282,7 +282,7 @@ impl Flight {
             prepared.slices() > self.slices && {
                 let view = arrays[status.expect("an engine asks for it")].get_mapped_range(..);
                 let view = view.expect("it has landed");
-                bytemuck::cast_slice(&view[..4 * draws.count as usize]).iter().any(|&word: &u32| word == 0)
+                bytemuck::cast_slice::<_, u32>(&view[..4 * draws.count as usize]).contains(&0)
             }
         })
     }

@@ -283,7 +283,7 @@ impl Reader<'_> {
         let table = match entry.text()? {
             "d65" => return Ok(colorimetry::d65(grid)),
             "flat" => return Ok(vec![1.0; grid.len()]),
-            path => Table::open(&self.folder.join(path), None),
+            path => Table::open(self.folder.join(path), None),
         };
         let wrong = |e: DatasetError| entry.wrong(SceneErrorKind::Mean(e));
         let tables = [table.map_err(wrong)?];

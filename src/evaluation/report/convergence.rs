@@ -139,7 +139,7 @@ struct Maker<'a> {
 }
 
 enum Drawing<'a> {
-    Engine(Runner<'a>),
+    Engine(Box<Runner<'a>>),
     Peer(Box<Peer>),
 }
 
@@ -164,7 +164,11 @@ impl<'a> Maker<'a> {
         let start = std::time::Instant::now();
         let mut runner = target.runner(recipe)?;
         runner.time(bench, Stream::new(bench.seed).draws(0..1))?;
-        Ok(Maker::new(Source::Engine(engine), start.elapsed().as_secs_f64(), Drawing::Engine(runner)))
+        Ok(Maker::new(
+            Source::Engine(engine),
+            start.elapsed().as_secs_f64(),
+            Drawing::Engine(Box::new(runner)),
+        ))
     }
 
     /// Seconds that a run of so many draws will take, from the largest that was made.
