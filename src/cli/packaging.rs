@@ -42,7 +42,7 @@ pub(crate) fn man(mut command: Command, arguments: &ManArguments) -> anyhow::Res
         let page = Man::new(command.clone());
         let mut text = Vec::new();
         page.render(&mut text)?;
-        write_file(&folder.join(page.get_filename()), IfExists::Replace, &text)?;
+        write_file(folder.join(page.get_filename()), IfExists::Replace, &text)?;
     }
     Ok(())
 }
