@@ -11,6 +11,8 @@ mod cover;
 #[cfg(test)]
 pub(crate) mod layout;
 mod module;
+// Only measurements leave parts out.
+#[cfg_attr(not(feature = "report"), allow(dead_code, unreachable_pub))]
 mod part;
 #[cfg(test)]
 mod probe;
@@ -20,6 +22,7 @@ mod text;
 
 pub use module::WgslError;
 pub(crate) use module::module;
+#[cfg_attr(not(feature = "report"), allow(unreachable_pub))]
 pub use part::Part;
 pub(crate) use tables::Tables;
 
@@ -146,6 +149,7 @@ fn kept(fragment: &str, holds: impl Fn(&str) -> bool) -> String {
 }
 
 /// The fragments that make random words and normals: the whole of what does not depend on a program.
+#[cfg(any(test, feature = "report"))]
 pub(crate) fn generator(target: Dialect) -> String {
     generator_without(target, None)
 }
