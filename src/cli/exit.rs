@@ -95,6 +95,7 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             OutputError::ManifestVersion { .. }
             | OutputError::Manifest { .. }
             | OutputError::Unrepaired { .. } => " (--force replaces the set)",
+            OutputError::NoSidecar { .. } => " (--sidecar)",
             OutputError::NothingMade { .. } => ": make each with --shard I/N --resume",
             OutputError::Unfinished { .. } => " (--resume or --force)",
             OutputError::NoSpace { .. } => " (--force-space overrides)",

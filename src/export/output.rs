@@ -45,6 +45,7 @@ pub struct Output {
     pub(super) shard: Shard,
     pub(super) mode: SetMode,
     pub(super) space_check: SpaceCheck,
+    pub(super) has_sidecar: bool,
 }
 
 impl Output {
@@ -70,6 +71,7 @@ impl Output {
             shard: Shard::WHOLE,
             mode: SetMode::Create,
             space_check: SpaceCheck::default(),
+            has_sidecar: false,
         }
     }
 
@@ -97,6 +99,11 @@ impl Output {
     /// Check of the room for the data set before it is begun ([`SpaceCheck::Require`]).
     pub fn space_check(self, space_check: SpaceCheck) -> Self {
         Output { space_check, ..self }
+    }
+
+    /// Writes a [`Sidecar`](crate::output::Sidecar) beside a single file. Sets have manifests instead.
+    pub fn with_sidecar(self) -> Self {
+        Output { has_sidecar: true, ..self }
     }
 
     /// The path.

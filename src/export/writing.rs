@@ -6,7 +6,9 @@ use std::path::PathBuf;
 
 use super::{Companions, Destination, Output, Rows};
 use crate::engine::{Engine, EngineError};
-use crate::output::{FileWriter, OutputError, Schema, SetStatus, SetWriter, SpdFolder, StreamWriter};
+use crate::output::{
+    FileWriter, OutputError, Schema, SetStatus, SetWriter, Sidecar, SpdFolder, StreamWriter,
+};
 
 /// Error that ended an export before its data set was complete.
 #[derive(Debug, thiserror::Error)]
@@ -55,7 +57,7 @@ pub struct Writing {
 
 enum Sink {
     Stream(StreamWriter),
-    File(FileWriter),
+    File(FileWriter, Option<Box<Sidecar>>),
     Spd(SpdFolder),
     Set(Box<SetWriter>),
 }
@@ -81,7 +83,16 @@ impl Writing {
                 Sink::Stream(stream.map_err(ExportError::Stdout)?)
             }
             Destination::File(format) => {
-                Sink::File(FileWriter::create(path, format, &schema, &companions.spectra, if_exists)?)
+                let file = FileWriter::create(path, format, &schema, &companions.spectra, if_exists)?;
+                let sidecar = match output.has_sidecar {
+                    true => {
+                        let model = companions.files.iter().find(|(name, _)| *name == "_model.json");
+                        let model = model.map(|(_, text)| text.as_str());
+                        Some(Box::new(Sidecar::new(format, &schema, rows.rounding()?, model)))
+                    }
+                    false => None,
+                };
+                Sink::File(file, sidecar)
             }
             Destination::SpdFolder => {
                 let Companions { spectra, first, .. } = companions;
@@ -150,7 +161,7 @@ impl Writing {
     fn write(&mut self, columns: &[&[u8]]) -> Result<(), ExportError> {
         match &mut self.sink {
             Sink::Stream(stream) => stream.write(columns).map_err(ExportError::Stdout),
-            Sink::File(file) => Ok(file.write(columns)?),
+            Sink::File(file, _) => Ok(file.write(columns)?),
             Sink::Spd(folder) => Ok(folder.write(columns)?),
             Sink::Set(set) => Ok(set.write(columns)?),
         }
@@ -159,7 +170,8 @@ impl Writing {
     fn finish(self) -> Result<SetStatus, ExportError> {
         match self.sink {
             Sink::Stream(stream) => stream.finish().map_err(ExportError::Stdout)?,
-            Sink::File(file) => file.finish()?,
+            Sink::File(file, Some(sidecar)) => file.finish_with(*sidecar)?,
+            Sink::File(file, None) => file.finish()?,
             Sink::Spd(folder) => folder.finish()?,
             Sink::Set(set) => return Ok(set.finish()?),
         }

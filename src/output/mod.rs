@@ -17,10 +17,14 @@ mod parquet;
 mod pending;
 mod schema;
 mod set;
+mod sidecar;
 mod spd;
+mod sum;
 
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
 
 use crate::quantity::Dtype;
 
@@ -31,11 +35,13 @@ pub use schema::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
 pub use set::{
     ChunkFormat, Fault, Piece, Progress, SetAudit, SetMode, SetPlan, SetStatus, SetWriter, Shard, merge,
 };
+pub use sidecar::Sidecar;
 pub use spd::{MOST_FILES, SpdFolder, files as spd_files};
 
 /// File format of a data set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum FileFormat {
     /// NumPy: one array, C order.
@@ -125,6 +131,8 @@ pub enum OutputError {
     Manifest { path: PathBuf, reason: String },
     #[error("{path:?} is the manifest of another version of this program: {remedy}")]
     ManifestVersion { path: PathBuf, remedy: &'static str },
+    #[error("{path:?} has no sidecar that says what was written: write one with the file")]
+    NoSidecar { path: PathBuf },
     #[error("cannot repair {path:?}: {reason}")]
     Unrepaired { path: PathBuf, reason: String },
     #[error("{path:?} is not complete: {done} of {chunks} chunks are done")]
@@ -273,10 +281,15 @@ impl FileWriter {
 
     /// Makes the file appear under its name, complete and on disk.
     pub fn finish(self) -> Result<(), OutputError> {
-        match self.encoder.finish() {
-            Ok(()) => self.pending.finish(),
-            Err(e) => Err(self.pending.failed(e)),
-        }
+        self.encoder.finish().map_err(|e| self.pending.failed(e))?;
+        Sidecar::remove(self.pending.path())?;
+        self.pending.finish()
+    }
+
+    /// Makes the file appear under its name, and its sidecar beside it.
+    pub fn finish_with(self, sidecar: Sidecar) -> Result<(), OutputError> {
+        self.encoder.finish().map_err(|e| self.pending.failed(e))?;
+        sidecar.finish(self.pending)
     }
 }
 

@@ -63,6 +63,11 @@ impl PendingFile {
         }
     }
 
+    /// Path at which the file will appear.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Opens the file for writing.
     pub fn file(&self) -> Result<File, OutputError> {
         self.file.as_file().try_clone().map_err(|source| self.failed(source))

@@ -44,6 +44,9 @@ pub(in crate::cli) struct OutputArguments {
     /// Replace what exists
     #[arg(long, conflicts_with_all = ["resume", "shard"])]
     pub(in crate::cli) force: bool,
+    /// Write NAME.spectroll.json beside a single file, with which `spectroll verify NAME` checks and repairs it
+    #[arg(long)]
+    sidecar: bool,
     /// Begin although the disk has no room for all of it
     #[arg(long)]
     force_space: bool,
@@ -91,6 +94,9 @@ impl OutputArguments {
         if let Some(rows) = self.chunk {
             output = output.chunk(rows);
         }
+        if self.sidecar {
+            output = output.with_sidecar();
+        }
         if self.force_space {
             output = output.space_check(SpaceCheck::Skip);
         }
@@ -134,6 +140,9 @@ impl OutputArguments {
             return Err(usage(&format!(
                 "{flag} needs an output of many files: name it .zarr, or FOLDER/ with --format npy or parquet"
             )));
+        }
+        if self.sidecar && !matches!(destination, Destination::File(_)) {
+            return Err(usage("--sidecar is for single files: sets of chunks have a manifest"));
         }
         if self.chunk == Some(0) {
             return Err(usage("a chunk has at least one draw"));

@@ -1,5 +1,6 @@
 //! `spectroll verify` and `spectroll merge`: checks, repair and completion of sets that were written before.
 
+mod file;
 mod sources;
 
 use std::collections::BTreeSet;
@@ -8,7 +9,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use rand::Rng;
 use spectroll::Stream;
-use spectroll::output::{Fault, Piece, SetAudit, merge};
+use spectroll::export::Destination;
+use spectroll::output::{Fault, Piece, SetAudit, Sidecar, merge};
 
 use super::exit::{Unverified, Usage};
 use super::interrupt;
@@ -16,13 +18,13 @@ use super::options::EngineArguments;
 use super::parse::{counted, grouped};
 use sources::{Request, chunk};
 
-/// Check a .zarr or a folder of parts against its manifest, and draw some of it again
+/// Check a .zarr, a folder of parts or a file with a sidecar against its sums, and draw some of it again
 #[derive(clap::Args)]
 pub(crate) struct VerifyArguments {
-    /// The set; an unfinished one is NAME.partial
+    /// The set, of which an unfinished one is NAME.partial; or a file that was written with --sidecar
     #[arg(value_name = "PATH")]
     path: PathBuf,
-    /// The share of the chunks that is drawn again and compared, 0 to 1
+    /// The share of the chunks that is drawn again and compared, 0 to 1; a file is drawn again with 1
     #[arg(long, default_value_t = 0.01, value_name = "SHARE", value_parser = share,
           allow_negative_numbers = true)]
     redraw: f64,
@@ -59,6 +61,9 @@ const LOOKS: usize = 10;
 
 pub(crate) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
     interrupt::watch();
+    if arguments.path.is_file() || Sidecar::path(&arguments.path).is_file() {
+        return file::run(arguments);
+    }
     let mut path = arguments.path.clone();
     for _ in 1..LOOKS {
         let audit = match SetAudit::open(&path) {
@@ -103,10 +108,17 @@ fn report(
     audit: &SetAudit,
     mut faults: Vec<Fault>,
 ) -> anyhow::Result<()> {
-    let request = Request { path, audit, files: arguments.files.as_deref(), engine: &arguments.engine };
+    let request = Request {
+        path,
+        schema: &audit.plan().schema,
+        destination: Destination::Set(audit.plan().layout),
+        sidecar: None,
+        files: arguments.files.as_deref(),
+        engine: &arguments.engine,
+    };
     let mut repaired = 0;
     if arguments.repair && !faults.is_empty() {
-        repaired = repair(request, &faults)?;
+        repaired = repair(request, audit, &faults)?;
         faults = self::faults(audit)?;
     }
     let chunks = audit.chunks();
@@ -114,7 +126,7 @@ fn report(
     let mut left = None;
     if !again.is_empty() && faults.is_empty() {
         match request.sources()? {
-            Ok(_) => faults = differences(request, &again)?,
+            Ok(_) => faults = differences(request, audit, &again)?,
             Err(reason) => left = Some(reason),
         }
     }
@@ -168,9 +180,9 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 /// Lists the chunks that differ from what is drawn now, and the arrays that all rows share if they do.
-fn differences(request: Request, chunks: &BTreeSet<u64>) -> anyhow::Result<Vec<Fault>> {
+fn differences(request: Request, audit: &SetAudit, chunks: &BTreeSet<u64>) -> anyhow::Result<Vec<Fault>> {
     let Ok(sources) = request.sources()? else { return Ok(Vec::new()) };
-    let (audit, schema) = (request.audit, &request.audit.plan().schema);
+    let schema = request.schema;
     let engine = sources.engine(request)?;
     let mut faults = audit.shared_differences(sources.shared(&engine, schema)?)?;
     let mut rows = sources.rows(&engine, schema)?;
@@ -181,8 +193,7 @@ fn differences(request: Request, chunks: &BTreeSet<u64>) -> anyhow::Result<Vec<F
 }
 
 /// Makes what is damaged of a complete set again. Returns the number of files.
-fn repair(request: Request, faults: &[Fault]) -> anyhow::Result<u64> {
-    let audit = request.audit;
+fn repair(request: Request, audit: &SetAudit, faults: &[Fault]) -> anyhow::Result<u64> {
     if !audit.is_complete() {
         let text = "--repair is for complete sets: run the command that began this one again, with --resume";
         return Err(Usage(text.to_owned()).into());
@@ -215,7 +226,7 @@ fn repair(request: Request, faults: &[Fault]) -> anyhow::Result<u64> {
     }
     let sources = request.sources()?.map_err(Unverified)?;
     let engine = sources.engine(request)?;
-    let schema = &audit.plan().schema;
+    let schema = request.schema;
     for (name, bytes) in audit.shared_files(sources.shared(&engine, schema)?)? {
         if names.contains(name.as_str()) {
             audit.repair_file(&name, &bytes)?;

@@ -8,10 +8,10 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use spectroll::export::provenance::model_sum;
 use spectroll::export::{
-    ArraySelection, Destination, DrawExport, DrawRows, ExportError, Output, Rows, SceneExport, SceneRows,
-    model_sums,
+    ArraySelection, Companions, Destination, DrawExport, DrawRows, ExportError, Output, Rows, SceneExport,
+    SceneRows, model_sums,
 };
-use spectroll::output::{Schema, SetAudit, SharedArray};
+use spectroll::output::{Schema, SetAudit, SharedArray, Sidecar};
 use spectroll::scene::Scene;
 use spectroll::{DrawRange, Engine, EngineChoice, EngineError, Grid, Model, Recipe, RecipeSettings, Stream};
 
@@ -19,12 +19,15 @@ use crate::cli::exit::Unverified;
 use crate::cli::options::EngineArguments;
 use crate::cli::{interrupt, run as runs};
 
-/// Set to draw again, and what was asked of that.
+/// Data set to draw again, and what was asked of that.
 #[derive(Clone, Copy)]
 pub(super) struct Request<'a> {
-    /// Folder of the set.
+    /// Folder of the set, or the file.
     pub(super) path: &'a Path,
-    pub(super) audit: &'a SetAudit,
+    pub(super) schema: &'a Schema,
+    pub(super) destination: Destination,
+    /// Sum that engines share which round as the one that drew it, and the text of the model, where a sidecar has them.
+    pub(super) sidecar: Option<&'a Sidecar>,
     /// Folder of the files that the set does not hold.
     pub(super) files: Option<&'a Path>,
     pub(super) engine: &'a EngineArguments,
@@ -37,13 +40,9 @@ pub(super) enum Sources {
 }
 
 impl<'a> Request<'a> {
-    fn schema(&self) -> &'a Schema {
-        &self.audit.plan().schema
-    }
-
     fn value(&self, name: &str) -> anyhow::Result<&'a Value> {
         let unusable = || format!("{:?} does not say how it was drawn; pass --redraw 0", self.path);
-        self.schema().attributes.get(name).with_context(unusable)
+        self.schema.attributes.get(name).with_context(unusable)
     }
 
     fn read<T: DeserializeOwned>(&self, name: &str) -> anyhow::Result<T> {
@@ -54,7 +53,7 @@ impl<'a> Request<'a> {
 
     /// Text of the scene file that the set records, if it is one of scenes.
     pub(super) fn scene_text(&self) -> Option<&'a str> {
-        self.schema().attributes.get("scene").and_then(Value::as_str)
+        self.schema.attributes.get("scene").and_then(Value::as_str)
     }
 
     /// The model of the draws: that in the set, or where it is damaged the built-in one or file that it was made from.
@@ -67,13 +66,16 @@ impl<'a> Request<'a> {
             false => None,
         };
         let builtin = || {
-            let grid = Grid::from_wavelengths(&self.schema().wavelengths).ok()?;
+            let grid = Grid::from_wavelengths(&self.schema.wavelengths).ok()?;
             Model::BUILTIN
                 .contains(&name.as_str())
                 .then(|| Model::builtin_at(&name, grid).ok())?
                 .filter(is_model)
         };
-        let found = load(self.path.join("_model.json"));
+        let found = match self.sidecar.and_then(Sidecar::model) {
+            Some(text) => Model::from_json(&name, text).ok().filter(is_model),
+            None => load(self.path.join("_model.json")),
+        };
         let found = found.or_else(|| self.files.and_then(|folder| load(folder.join(&name)))).or_else(builtin);
         found.ok_or_else(|| {
             let text = format!(
@@ -87,7 +89,7 @@ impl<'a> Request<'a> {
 
     /// Reads the sources of the set; a text says which is missing.
     pub(super) fn sources(&self) -> anyhow::Result<Result<Sources, String>> {
-        let sources = match self.schema().attributes.contains_key("scene") {
+        let sources = match self.schema.attributes.contains_key("scene") {
             true => self.scenes()?,
             false => Ok(self.draws()?),
         };
@@ -95,7 +97,7 @@ impl<'a> Request<'a> {
             let of = |schema: &Schema| -> Vec<_> {
                 schema.fields.iter().map(|field| (field.name.clone(), field.width, field.dtype)).collect()
             };
-            if of(&self.expected(sources)) != of(self.schema()) {
+            if of(&self.expected(sources)) != of(self.schema) {
                 let text = format!("{:?}: the arrays of its manifest are not those of its recipe", self.path);
                 return Err(Unverified(text).into());
             }
@@ -105,11 +107,11 @@ impl<'a> Request<'a> {
 
     /// Schema of a set of these sources.
     fn expected(&self, sources: &Sources) -> Schema {
-        let output = Output::at(self.path, Destination::Set(self.audit.plan().layout));
+        let output = Output::at(self.path, self.destination);
         match sources {
             Sources::Draws { recipe, draws } => DrawExport::new(recipe, *draws).schema(&output),
             Sources::Scenes { scene, selection, first } => {
-                let scenes = *first..first.saturating_add(self.schema().count);
+                let scenes = *first..first.saturating_add(self.schema.count);
                 SceneExport::new(scene, scenes).selection(selection.clone()).schema(&output)
             }
         }
@@ -118,7 +120,7 @@ impl<'a> Request<'a> {
     fn draws(&self) -> anyhow::Result<Sources> {
         let model = self.model()?;
         let recipe = Box::new(self.read::<RecipeSettings>("recipe")?.builder(&model).build()?);
-        let (seed, count) = (self.read("seed")?, self.schema().count);
+        let (seed, count) = (self.read("seed")?, self.schema.count);
         let stream = match self.read::<Option<String>>("stream")? {
             Some(name) => Stream::named(seed, &name),
             None => Stream::new(seed),
@@ -149,6 +151,16 @@ impl<'a> Request<'a> {
 }
 
 impl Sources {
+    /// Files beside the rows.
+    pub(super) fn companions(&self) -> Companions {
+        match self {
+            Sources::Draws { recipe, draws } => DrawExport::new(recipe, *draws).companions(),
+            Sources::Scenes { scene, selection, first } => {
+                SceneExport::new(scene, *first..*first).selection(selection.clone()).companions()
+            }
+        }
+    }
+
     /// Prepares to draw the set again.
     pub(super) fn rows<'a>(
         &'a self,
@@ -163,11 +175,14 @@ impl Sources {
 
     /// An engine that rounds as the one that drew the set: the one asked for, or the first that does.
     pub(super) fn engine(&self, request: Request) -> anyhow::Result<Engine> {
-        let rounding: String = request.read("rounding")?;
+        let rounding = match request.sidecar {
+            Some(sidecar) => sidecar.rounding().to_owned(),
+            None => request.read("rounding")?,
+        };
         let choice = request.engine.choice();
         for choice in choice.map_or(vec![EngineChoice::Auto, EngineChoice::Cpu], |choice| vec![choice]) {
             let engine = Engine::with_threads(&choice, request.engine.threads)?;
-            if self.rows(&engine, request.schema())?.rounding()? == rounding {
+            if self.rows(&engine, request.schema)?.rounding()? == rounding {
                 return Ok(engine);
             }
         }

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use super::super::OutputError;
 use super::super::pending::{place, sync_folder};
 use super::super::schema::SharedArray;
-use super::manifest::{Manifest, SEALED, SetPlan, Sum};
+use super::super::sum::Sum;
+use super::Part;
+use super::manifest::{Manifest, SEALED, SetPlan};
 
 /// A set that is being checked, complete or not.
 pub struct SetAudit {
@@ -137,7 +139,7 @@ impl SetAudit {
         let plan = self.plan();
         plan.layout.check(&self.root, &plan.schema)?;
         let parts = plan.layout.encode(plan, chunk, columns).map_err(|e| self.failed(e))?;
-        let sums: Vec<Sum> = parts.iter().map(Sum::of).collect();
+        let sums: Vec<Sum> = parts.iter().map(Part::sum).collect();
         let written = self.manifest.chunks[&chunk].iter();
         let differing = written.zip(&sums).filter(|(a, b)| a != b);
         let text = |name: &str| format!("{name} is not what is drawn now");
@@ -190,7 +192,7 @@ impl SetAudit {
         plan.layout.check(&self.root, &plan.schema)?;
         let parts = plan.layout.encode(plan, chunk, columns).map_err(|e| self.failed(e))?;
         for (part, sum) in parts.iter().zip(&self.manifest.chunks[&chunk]) {
-            if Sum::of(part) != *sum {
+            if part.sum() != *sum {
                 return Err(
                     self.unrepaired(format!("{} is drawn otherwise now than it was written", part.name))
                 );

@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Component, Path};
 
-use super::super::{Field, SharedArray};
+use super::super::sum::Sum;
+use super::super::{Field, Schema, SharedArray};
 use super::SetPlan;
-use super::manifest::{Manifest, Sum};
+use super::manifest::Manifest;
 use crate::quantity::Dtype;
 
 /// Largest number of values per draw in an array, and of values in an array that all draws share.
@@ -38,6 +39,15 @@ pub(super) fn check(manifest: &Manifest) -> Result<(), String> {
 
 fn check_plan(plan: &SetPlan) -> Result<(), String> {
     let schema = &plan.schema;
+    check_schema(schema)?;
+    match plan.chunk == 0 || plan.chunk > schema.count.max(1) {
+        true => Err(format!("chunks of {} draws are none of a set of {}", plan.chunk, schema.count)),
+        false => Ok(()),
+    }
+}
+
+/// Describes what in a schema no data set can have, if there is something.
+pub(in crate::output) fn check_schema(schema: &Schema) -> Result<(), String> {
     let mut names = BTreeSet::new();
     let arrays = schema.fields.iter().map(|field| &field.name);
     for name in arrays.chain(schema.shared.iter().map(|shared| &shared.name)) {
@@ -53,9 +63,6 @@ fn check_plan(plan: &SetPlan) -> Result<(), String> {
     }
     if let Some(shared) = schema.shared.iter().find(|shared| !is_sound_shared(shared)) {
         return Err(format!("the array {:?} has no such shape", shared.name));
-    }
-    if plan.chunk == 0 || plan.chunk > schema.count.max(1) {
-        return Err(format!("chunks of {} draws are none of a set of {}", plan.chunk, schema.count));
     }
     let bytes = schema.count.checked_mul(schema.row_bytes().max(1));
     if bytes.is_none_or(|bytes| bytes > BYTES) {

@@ -5,6 +5,7 @@ use std::io;
 
 use serde::{Deserialize, Serialize};
 
+use super::super::sum::Sum;
 use super::{SetPlan, parts, zarr};
 
 /// Approximate default size of a chunk in bytes: large enough for a disk, small enough to hold several.
@@ -30,6 +31,12 @@ pub(super) struct Part<'a> {
     /// Path in the set's folder.
     pub(super) name: String,
     pub(super) bytes: Cow<'a, [u8]>,
+}
+
+impl Part<'_> {
+    pub(super) fn sum(&self) -> Sum {
+        Sum::new(&self.name, &self.bytes)
+    }
 }
 
 impl ChunkFormat {

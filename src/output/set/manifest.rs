@@ -4,8 +4,8 @@
 //! set without a coordinator. Sealing joins them into one. A manifest ends with its own sum.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
-use std::io::{self, Read};
+use std::fs;
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -13,21 +13,16 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::super::pending::ignore_missing;
+use super::super::sum::{Sum, is_signed, regular, signed};
 use super::super::{OutputError, Schema, partial};
 use super::check::check;
-use super::{ChunkFormat, Part, SetMode, Shard};
+use super::{ChunkFormat, SetMode, Shard};
 
 /// Name of the manifest of a whole set.
 pub(super) const SEALED: &str = "_manifest.json";
 
 /// Version of the manifest that this program writes and reads.
 const VERSION: u32 = 2;
-
-/// Largest manifest that is read, in bytes.
-const LARGEST: u64 = 1 << 30;
-
-/// Bytes of a file that are summed at once.
-const BUFFER: usize = 1 << 20;
 
 /// Plan of a set: everything that its bytes depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,65 +82,6 @@ fn difference(place: &str, here: &Value, there: &Value) -> Option<String> {
             names.into_iter().find_map(|name| difference(&inner(name), &value(a, name), &value(b, name)))
         }
         _ => Some(format!("{} is {there} there and {here} here", place.trim_start_matches("attributes."))),
-    }
-}
-
-/// Sum of a file, as it was written.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Sum {
-    pub(super) name: String,
-    pub(super) bytes: u64,
-    pub(super) blake3: String,
-}
-
-impl Sum {
-    pub(super) fn of(part: &Part) -> Sum {
-        Sum::new(&part.name, &part.bytes)
-    }
-
-    pub(super) fn new(name: &str, bytes: &[u8]) -> Sum {
-        let blake3 = blake3::hash(bytes).to_hex().to_string();
-        Sum { name: name.to_owned(), bytes: bytes.len() as u64, blake3 }
-    }
-
-    /// Describes how the file in a set differs from what was written, if it does.
-    pub(super) fn fault(&self, root: &Path) -> Option<String> {
-        if let Some(fault) = self.size_fault(root) {
-            return Some(fault);
-        }
-        match self.hash(&root.join(&self.name)) {
-            Ok(sum) if sum == self.blake3 => None,
-            Ok(_) => Some(format!("{} does not match its BLAKE3 sum", self.name)),
-            Err(e) => Some(format!("{} cannot be read: {e}", self.name)),
-        }
-    }
-
-    /// Describes how the file's size differs from what was written, or whether it is missing. Reads no file, and so
-    /// waits for none.
-    pub(super) fn size_fault(&self, root: &Path) -> Option<String> {
-        match fs::metadata(root.join(&self.name)) {
-            Ok(found) if !found.is_file() => Some(format!("{} is not a plain file", self.name)),
-            Ok(found) if found.len() != self.bytes => {
-                Some(format!("{} has {} bytes instead of {}", self.name, found.len(), self.bytes))
-            }
-            Ok(_) => None,
-            Err(e) if e.kind() == io::ErrorKind::NotFound => Some(format!("{} is missing", self.name)),
-            Err(e) => Some(format!("{} cannot be read: {e}", self.name)),
-        }
-    }
-
-    /// Sum of the file as it is, of no more than its bytes.
-    fn hash(&self, path: &Path) -> io::Result<String> {
-        let mut file = File::open(path)?.take(self.bytes);
-        let (mut hasher, mut buffer) = (blake3::Hasher::new(), vec![0; BUFFER.min(self.bytes as usize + 1)]);
-        loop {
-            match file.read(&mut buffer) {
-                Ok(0) => return Ok(hasher.finalize().to_hex().to_string()),
-                Ok(read) => _ = hasher.update(&buffer[..read]),
-                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-                Err(e) => return Err(e),
-            }
-        }
     }
 }
 
@@ -211,11 +147,7 @@ impl Manifest {
 
     /// Text of the manifest's file.
     pub(super) fn text(&self) -> String {
-        let unsigned = Manifest { blake3: String::new(), ..self.clone() };
-        let text = serde_json::to_string_pretty(&unsigned).expect("manifests are JSON") + "\n";
-        let sum = blake3::hash(text.as_bytes()).to_hex();
-        let start = text.strip_suffix(END).expect("the sum is the last entry");
-        format!("{start}{sum}{END}")
+        signed(&Manifest { blake3: String::new(), ..self.clone() })
     }
 
     /// Reads the manifest of a whole set.
@@ -249,9 +181,6 @@ impl Manifest {
         Ok(joined)
     }
 }
-
-/// End of a manifest's text, after the sum.
-const END: &str = "\"\n}\n";
 
 /// Name of the manifest of one of several processes.
 pub(super) fn part_name(shard: Shard) -> String {
@@ -300,28 +229,11 @@ fn read(path: &Path) -> Result<Option<Manifest>, OutputError> {
         return Err(OutputError::ManifestVersion { path: path.to_owned(), remedy });
     }
     let manifest: Manifest = serde_json::from_str(&text).map_err(|e| failed(e.to_string()))?;
-    let signed = format!("{}{END}", manifest.blake3);
-    let unsigned = text.strip_suffix(&signed).map(|start| format!("{start}{END}"));
-    let sum = unsigned.map(|unsigned| blake3::hash(unsigned.as_bytes()).to_hex().to_string());
-    if sum.as_ref() != Some(&manifest.blake3) {
+    if !is_signed(&text, &manifest.blake3) {
         return Err(failed("it does not match its BLAKE3 sum".to_owned()));
     }
     check(&manifest).map_err(failed)?;
     Ok(Some(manifest))
-}
-
-/// Text of a plain file of no more than [`LARGEST`] bytes.
-fn regular(path: &Path) -> io::Result<String> {
-    let found = fs::metadata(path)?;
-    if !found.is_file() {
-        return Err(io::Error::other("it is not a plain file"));
-    }
-    if found.len() > LARGEST {
-        return Err(io::Error::other(format!("it has {} bytes, and no manifest has", found.len())));
-    }
-    let mut text = String::new();
-    File::open(path)?.take(LARGEST).read_to_string(&mut text)?;
-    Ok(text)
 }
 
 #[cfg(test)]

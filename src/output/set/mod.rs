@@ -6,7 +6,7 @@
 //! in the bytes. Locks keep two processes from the same chunks, and a set from being replaced while it is written.
 
 mod audit;
-mod check;
+pub(super) mod check;
 mod layout;
 mod manifest;
 mod occupy;
@@ -27,11 +27,12 @@ use rayon::prelude::*;
 use super::OutputError;
 use super::lock::LockFile;
 use super::pending::{existing_folder, place};
+use super::sum::Sum;
 pub use audit::{Fault, Piece, SetAudit};
 pub use layout::ChunkFormat;
 use layout::Part;
 pub use manifest::SetPlan;
-use manifest::{Manifest, Sum, part_name};
+use manifest::{Manifest, part_name};
 use occupy::{Begun, generation, occupy};
 use pool::{Chunk, Pool};
 use seal::Depth;
@@ -183,7 +184,7 @@ impl SetWriter {
             .map(|(name, text)| Part { name: (*name).to_owned(), bytes: text.as_bytes().into() });
         for part in constants.into_iter().chain(companions) {
             place(&self.root.join(&part.name), &part.bytes).map_err(|e| self.failed(e))?;
-            self.manifest.note(Sum::of(&part));
+            self.manifest.note(part.sum());
         }
         self.save()?;
         // Of two processes that begin one set at once with two plans, the second to get here is wrong.

@@ -117,7 +117,8 @@ fn begin(path: &Path, shard: Shard, start: SetMode) -> Result<Option<Begun>, Out
         Err(e) => return Err(failed(path, e)),
     };
     if !is_new && !root.join(LOCK).exists() && !is_ours(&root).map_err(|e| failed(path, e))? {
-        return match root.exists() {
+        // Another process may have begun or completed the set since.
+        return match root.exists() && !root.join(LOCK).exists() {
             true => {
                 Err(OutputError::NotOurs { path: root, expected: "an unfinished data set of this program" })
             }

@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use super::super::pending::place;
+use super::super::sum::Sum;
 use super::SetPlan;
-use super::manifest::Sum;
 
 /// Number of threads: one can hash while the other waits for the disk.
 const THREADS: usize = 2;
@@ -109,7 +109,7 @@ impl Worker {
             .iter()
             .map(|part| {
                 place(&self.root.join(&part.name), &part.bytes)?;
-                Ok(Sum::of(part))
+                Ok(part.sum())
             })
             .collect()
     }

@@ -8,9 +8,10 @@ use rayon::prelude::*;
 
 use super::super::lock::{Attempt, LockFile};
 use super::super::pending::{folder, ignore_missing, place, sweep, sync_folder};
+use super::super::sum::Sum;
 use super::super::{OutputError, partial};
 use super::Shard;
-use super::manifest::{Manifest, SEALED, Sum, remove_parts};
+use super::manifest::{Manifest, SEALED, remove_parts};
 use super::occupy::{
     LOCK, PATIENCE, PAUSE, busy, folders, generation, is_being_made, is_lock_name, remove_replaced, replaced,
 };
@@ -174,7 +175,7 @@ fn rename(
     let layout = manifest.plan.layout;
     for part in layout.metadata(&manifest.plan).map_err(failed)? {
         place(&root.join(&part.name), &part.bytes).map_err(failed)?;
-        manifest.note(Sum::of(&part));
+        manifest.note(part.sum());
     }
     place(&root.join(SEALED), manifest.text().as_bytes()).map_err(failed)?;
     remove_parts(root).map_err(failed)?;

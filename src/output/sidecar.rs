@@ -1,0 +1,129 @@
+//! Sidecar of a single file: its sum, and all that it takes to draw it again.
+//!
+//! Some formats have attributes and others have none, and no format can hold the sum of its own file. So this is
+//! a file of its own, for those who ask for it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::pending::{PendingFile, folder, ignore_missing, place, sync_folder};
+use super::set::check::check_schema;
+use super::sum::{Sum, is_signed, regular, signed};
+use super::{FileFormat, OutputError, Schema};
+
+/// Version of the sidecar that this program writes and reads.
+const VERSION: u32 = 1;
+
+/// End of its name, after that of the file.
+const SUFFIX: &str = ".spectroll.json";
+
+/// Sum of a single file, and what it was drawn from.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sidecar {
+    sidecar: u32,
+    file: Option<Sum>,
+    format: FileFormat,
+    /// Sum that engines share which round alike.
+    rounding: String,
+    schema: Schema,
+    /// Text of the model; `None` of scenes.
+    model: Option<String>,
+    /// Sum of the text of the sidecar in which this is empty.
+    blake3: String,
+}
+
+impl Sidecar {
+    /// Makes a sidecar of a file that is still to be written.
+    pub fn new(format: FileFormat, schema: &Schema, rounding: String, model: Option<&str>) -> Sidecar {
+        Sidecar {
+            sidecar: VERSION,
+            file: None,
+            format,
+            rounding,
+            schema: schema.clone(),
+            model: model.map(str::to_owned),
+            blake3: String::new(),
+        }
+    }
+
+    /// Path of the sidecar of a file.
+    pub fn path(file: &Path) -> PathBuf {
+        let mut name = file.as_os_str().to_owned();
+        name.push(SUFFIX);
+        PathBuf::from(name)
+    }
+
+    /// Reads the sidecar of a file.
+    pub fn load(file: &Path) -> Result<Sidecar, OutputError> {
+        let path = Sidecar::path(file);
+        let failed = |reason: String| OutputError::Manifest { path: path.clone(), reason };
+        let text = match regular(&path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {
+                return Err(OutputError::NoSidecar { path: file.to_owned() });
+            }
+            text => text.map_err(|e| failed(e.to_string()))?,
+        };
+        let sidecar: Sidecar = serde_json::from_str(&text).map_err(|e| failed(e.to_string()))?;
+        if sidecar.sidecar != VERSION {
+            return Err(OutputError::ManifestVersion { path, remedy: "update spectroll" });
+        }
+        if !is_signed(&text, &sidecar.blake3) {
+            return Err(failed("it does not match its BLAKE3 sum".to_owned()));
+        }
+        check_schema(&sidecar.schema).map_err(failed)?;
+        Ok(sidecar)
+    }
+
+    /// Removes the sidecar of a file that is replaced, or was deleted, by one that has none.
+    pub(super) fn remove(file: &Path) -> Result<(), OutputError> {
+        let path = Sidecar::path(file);
+        fs::remove_file(&path).or_else(ignore_missing).map_err(|source| OutputError::Write { path, source })
+    }
+
+    /// Makes a file and its sidecar appear under their names. There is no moment at which the sidecar is that of another
+    /// file.
+    pub(super) fn finish(self, pending: PendingFile) -> Result<(), OutputError> {
+        let path = pending.path().to_owned();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let sum = Sum::of_file(&name, pending.temporary_path()).map_err(|e| pending.failed(e))?;
+        Sidecar::remove(&path)?;
+        pending.finish()?;
+        let sidecar = Sidecar { file: Some(sum), ..self };
+        let beside = Sidecar::path(&path);
+        place(&beside, signed(&sidecar).as_bytes())
+            .map_err(|source| OutputError::Write { path: beside, source })?;
+        sync_folder(folder(&path));
+        Ok(())
+    }
+
+    /// Describes how a file differs from what was written, if it does. It may have another name.
+    pub fn fault(&self, file: &Path) -> Option<String> {
+        let Some(sum) = &self.file else { return Some("the sidecar has no sum".to_owned()) };
+        let name = file.file_name()?.to_str().unwrap_or(&sum.name).to_owned();
+        Sum { name, ..sum.clone() }.fault(folder(file))
+    }
+
+    /// Format of the file.
+    pub fn format(&self) -> FileFormat {
+        self.format
+    }
+
+    /// Schema of the file.
+    pub fn schema(&self) -> &Schema {
+        &self.schema
+    }
+
+    /// Sum that engines share which round as the one that drew the file.
+    pub fn rounding(&self) -> &str {
+        &self.rounding
+    }
+
+    /// Text of the model; `None` of scenes.
+    pub fn model(&self) -> Option<&str> {
+        self.model.as_deref()
+    }
+}
