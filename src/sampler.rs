@@ -280,7 +280,7 @@ impl Sampler {
     }
 }
 
-/// A range of draws, ready to be recorded, any number of times.
+/// A range of draws with its buffers, ready to be recorded into a wgpu command encoder, any number of times.
 #[derive(Debug)]
 pub struct Prepared {
     sampler: Sampler,

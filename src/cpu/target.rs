@@ -1,6 +1,7 @@
 //! The factor that scales reflectances to their target luminous reflectance, which may be each draw's own.
 
-use super::{floored, least, round};
+use super::acceptance::least;
+use super::{floored, round};
 use crate::program::{self, LrvLaw};
 use crate::random::real::Real;
 

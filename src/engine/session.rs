@@ -14,7 +14,7 @@ impl Engine {
     }
 }
 
-/// An engine with a recipe. See [`Engine::session`].
+/// Draws of a recipe on an engine, range after range. See [`Engine::session`].
 pub struct Session<'a> {
     recipe: &'a Recipe,
     schedule: Schedule<'a>,

@@ -26,7 +26,7 @@ pub const MAX_COMPONENTS: usize = 1000;
 /// The version of the file format that this program writes, and the newest that it reads.
 const SCHEMA: u32 = 1;
 
-/// Divisor of each spectrum before the fit.
+/// Choice of what each spectrum is divided by before the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]

@@ -81,7 +81,11 @@ impl Sidecar {
     /// Removes the sidecar of a file that is replaced, or was deleted, by one that has none.
     pub(super) fn remove(file: &Path) -> Result<(), OutputError> {
         let path = Sidecar::path(file);
-        fs::remove_file(&path).or_else(ignore_missing).map_err(|source| OutputError::Write { path, source })
+        match fs::remove_file(&path) {
+            // A file whose name leaves no room for that of a sidecar has none.
+            Err(e) if e.kind() == io::ErrorKind::InvalidFilename => Ok(()),
+            removed => removed.or_else(ignore_missing).map_err(|source| OutputError::Write { path, source }),
+        }
     }
 
     /// Makes a file and its sidecar appear under their names. There is no moment at which the sidecar is that of another

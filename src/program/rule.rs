@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::affine::Affine;
 
-/// Spectrum that must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance (LRV).
+/// Choice of the spectrum that must lie between 0 and 1 where a reflectance is scaled to a target luminous reflectance
+/// (LRV).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]

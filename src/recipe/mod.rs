@@ -43,7 +43,7 @@ pub struct Recipe {
     cover: Option<CoverSize>,
 }
 
-/// The size of a cover.
+/// Size of a cover: of the boxes that candidates come from where plain rejection finds next to none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CoverSize {

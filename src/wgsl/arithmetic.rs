@@ -12,11 +12,12 @@
 //! depend on it take it: `factor(z, target_lrv)`, `scale(z, target_lrv)` and, where the scaled spectrum is bounded,
 //! `is_accepted(z, target_lrv)`.
 
+use super::acceptance::acceptance;
+use super::shader::{LOOPED, LUMINANCE, NORMALS};
 use super::tables::Tables;
-use super::text::{Text, float, list};
-use super::{COVER_AT, Form, LOOPED, LUMINANCE, NORMALS, Part};
+use super::writer::{Text, float, list};
+use super::{COVER_AT, Form, Part};
 use crate::affine::Affine;
-use crate::dataset::SpectrumKind;
 use crate::program::{IntensityLaw, LrvLaw, LrvTarget, Program, Source, Unit};
 use crate::random::real::Arithmetic;
 use crate::random::stream;
@@ -30,26 +31,7 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables, part: Option<Part>)
     if let Some(target) = &program.target {
         factor(&mut text, target);
     }
-    let (parameter, argument) = match program.tests_own_targets() {
-        true => (", target_lrv: f32", ", target_lrv"),
-        false => ("", ""),
-    };
-    text.block(&format!("fn is_accepted(z: Normals{parameter}) -> bool"), |body| {
-        // What the excess of every band must be below: that of 1, or of infinity.
-        let bound = match program.kind {
-            SpectrumKind::Reflectance if program.tests_base() => 1f32,
-            _ => f32::INFINITY,
-        };
-        let limit = bound.to_bits() - 1;
-        match program.tests_scaled() {
-            _ if part == Some(Part::Test) => body.line("return true;"),
-            false => body.line(&format!("return worst(z) < {limit}u;")),
-            true => {
-                body.line("let e = worst(z);");
-                body.line(&format!("return e < {limit}u && peak(e) * factor(z{argument}) < 1f;"));
-            }
-        }
-    });
+    acceptance(&mut text, program, part);
     if program.has_own_targets() {
         text.block("fn scale(z: Normals, target_lrv: f32) -> f32", |body| {
             body.line("return factor(z, target_lrv);");

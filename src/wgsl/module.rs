@@ -1,9 +1,10 @@
 //! The draw as a module of functions, for shaders of others: no bindings, no entry points, and a prefix on every name,
 //! so that several models live in one shader.
 
+use super::shader::functions;
 use super::tables::Tables;
-use super::text::{Text, list};
-use super::{Dialect, Form, UNROLLED_GAINS, functions};
+use super::writer::{Text, list};
+use super::{Dialect, Form, UNROLLED_GAINS};
 use crate::program::{IntensityLaw, Program, Source, Unit};
 use crate::quantity::Quantity;
 use crate::random::real::Arithmetic;

@@ -1,7 +1,7 @@
 //! Stores of a thread's draws: `fn store`, and the buffers that it writes.
 
 use super::tables::Tables;
-use super::text::Text;
+use super::writer::Text;
 use super::{Dialect, Form, OUTPUTS_AT, Part, draws_per_thread};
 use crate::draw_status::DrawStatus;
 use crate::program::{Output, Program, Source, Unit};
