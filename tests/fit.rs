@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -46,16 +46,24 @@ struct Reference {
     explained: f64,
 }
 
+/// The Python that the tests use, and a command that runs one of their scripts with it.
+fn python(script: &str) -> (String, Command) {
+    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or("python3".to_owned());
+    let mut command = Command::new(&python);
+    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(script));
+    (python, command)
+}
+
+fn run(command: &mut Command, python: &str) -> Output {
+    command.output().unwrap_or_else(|e| {
+        panic!("cannot run {python}: {e}; set SPECTROLL_PYTHON to a Python with NumPy and SciPy")
+    })
+}
+
 fn references(granada: Option<&Path>) -> HashMap<String, Reference> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or("python3".to_owned());
-    let output = Command::new(&python)
-        .args([root.join("tests/fit_reference.py"), root.join("data")])
-        .args(granada)
-        .output()
-        .unwrap_or_else(|e| {
-            panic!("cannot run {python}: {e}; set SPECTROLL_PYTHON to a Python with NumPy and SciPy")
-        });
+    let (python, mut command) = python("fit_reference.py");
+    let output = run(command.arg(root.join("data")).args(granada), &python);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(
         !errors.contains("ModuleNotFoundError"),
@@ -233,13 +241,8 @@ fn what_is_not_a_model_says_why() {
 
 /// Fits this many small data sets with the program; see `fit_small.py`.
 fn assert_small_fits(count: u32) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or("python3".to_owned());
-    let output = Command::new(&python)
-        .arg(root.join("tests/fit_small.py"))
-        .args([env!("CARGO_BIN_EXE_spectroll"), &count.to_string()])
-        .output()
-        .unwrap_or_else(|e| panic!("cannot run {python}: {e}"));
+    let (python, mut command) = python("fit_small.py");
+    let output = run(command.args([env!("CARGO_BIN_EXE_spectroll"), &count.to_string()]), &python);
     println!("{}", String::from_utf8_lossy(&output.stdout));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -6,7 +6,7 @@
 
 mod engines;
 
-use engines::{cpu, gpu, surfaces};
+use engines::{cpu, gpu, gpu_is_software, surfaces};
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use spectroll::evaluation::statistics::tinted;
@@ -309,7 +309,7 @@ fn draws_of_very_many_attempts() {
     for draws in [Stream::new(16).draws(0..2001), Stream::new(16).draws(0..1)] {
         let recipe = recipe(300_000);
         let (ours, theirs) = (rows(cpu(), &recipe, draws), rows(gpu(), &recipe, draws));
-        assert!(gpu().adapter().is_some_and(|adapter| adapter.kind != "software") || ours == theirs);
+        assert!(!gpu_is_software() || ours == theirs);
         most = ours.statuses.iter().map(|status| status.attempts()).max().expect("there are draws").max(most);
     }
     println!("up to {most} attempts");

@@ -84,7 +84,8 @@ pub(crate) fn shader(program: &Program, target: Dialect) -> (String, Tables) {
 
 /// The compute shader of a program, which lacks a part: what it draws is wrong, and its time shows what the part costs.
 pub(crate) fn shader_without(program: &Program, target: Dialect, part: Option<Part>) -> (String, Tables) {
-    let program = &if part == Some(Part::Reconstruction) { one_gain_each(program) } else { program.clone() };
+    let changed = (part == Some(Part::Reconstruction)).then(|| one_gain_each(program));
+    let program = changed.as_ref().unwrap_or(program);
     let tables = Tables::new(program);
     let draws = draws_per_thread(program, target);
     let sliced = is_sliced(program, target);

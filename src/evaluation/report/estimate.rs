@@ -101,8 +101,7 @@ impl<'a> Moments<'a> {
         let mut sums = Moments::new(self.model);
         let (n, k) = (sums.bands.len(), sums.weights.len());
         let parts = self.model.parts();
-        let mut basis = parts.basis.as_slice().chunks_exact(k); // a column, and so a band, at a time
-        let basis: Vec<&[f64]> = basis.by_ref().collect();
+        let basis: Vec<&[f64]> = parts.basis.as_slice().chunks_exact(k).collect(); // a column, so a band, each
         let zero: Lanes = [0.0; LANES];
         let (mut bands, mut squares) = (vec![zero; n], vec![zero; n]);
         let (mut totals, mut products) = (vec![zero; k], vec![zero; k * (k + 1) / 2]);
