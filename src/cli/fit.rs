@@ -138,7 +138,7 @@ fn no_data(name: &str) -> String {
     }
     let tables = BuiltinTable::ALL.iter().map(|table| table.name());
     let meant = closest(name, tables).map_or(String::new(), |meant| format!(", did you mean {meant}?"));
-    format!("{name:?} is neither a file nor a built-in table (munsell, vrhel){meant}")
+    format!("{name:?} is neither a file nor a built-in table (munsell, vrhel, granada){meant}")
 }
 
 /// Kind of the spectra: as asked, else as their names say, if those agree.
