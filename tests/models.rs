@@ -167,11 +167,10 @@ fn the_grid_of_a_model_file_stands() {
 }
 
 #[test]
-fn the_version_has_the_commit_where_it_is_known() {
+fn the_version_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let (version, _) = succeeds(folder.path(), "--version");
     assert!(version.starts_with(concat!("spectroll ", env!("CARGO_PKG_VERSION"))), "{version}");
-    assert_eq!(version.trim(), concat!("spectroll ", env!("SPECTROLL_VERSION")));
 }
 
 #[test]
