@@ -5,6 +5,7 @@
 mod grid;
 #[doc(hidden)]
 pub mod suggestion;
+mod threads;
 
 mod dataset;
 
@@ -56,6 +57,7 @@ pub use recipe::{
     RecipeError, RecipeSettings, ScalarSampler, XyzScale,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
+pub use threads::ThreadError;
 // What stands in signatures, so that hosts take the same versions.
 pub use wgsl::WgslError;
 pub use {half, nalgebra, rand, wgpu};

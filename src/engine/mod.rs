@@ -13,6 +13,7 @@ mod session;
 use std::fmt;
 use std::num::NonZeroUsize;
 use std::ops::AddAssign;
+use std::sync::Arc;
 
 use half::f16;
 use serde::Serialize;
@@ -27,6 +28,7 @@ use crate::quantity::{ArrayFormat, Dtype, Quantity};
 use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
 use crate::sampler::SamplerError;
+use crate::threads::{self, ThreadError};
 
 /// Choice of where to draw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -56,8 +58,8 @@ pub enum EngineError {
     NoAdapters,
     #[error("adapter {adapter}: {reason}")]
     Gpu { adapter: String, reason: String },
-    #[error("cannot start the threads to draw with: {0}; ask for fewer")]
-    Threads(String),
+    #[error(transparent)]
+    Threads(#[from] ThreadError),
     #[error(transparent)]
     Range(#[from] SamplerError),
     #[error(
@@ -109,7 +111,7 @@ pub struct Engine {
 enum Device {
     Gpu(gpu::Gpu),
     /// Threads of its own: those of a caller might all be waiting for their draws.
-    Cpu(rayon::ThreadPool),
+    Cpu(Arc<rayon::ThreadPool>),
 }
 
 /// A window of draws, as the caller receives them: an array for each quantity that the recipe asks for, and statuses.
@@ -240,11 +242,7 @@ impl Engine {
         };
         let device = match adapter {
             Some(adapter) => Device::Gpu(gpu::Gpu::open(adapter)?),
-            None => {
-                let builder =
-                    rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, NonZeroUsize::get));
-                Device::Cpu(builder.build().map_err(|e| EngineError::Threads(e.to_string()))?)
-            }
+            None => Device::Cpu(Arc::new(threads::pool(threads)?)),
         };
         Ok(Engine { device })
     }
@@ -254,6 +252,14 @@ impl Engine {
         match &self.device {
             Device::Gpu(gpu) => Some(gpu.adapter()),
             Device::Cpu(_) => None,
+        }
+    }
+
+    /// Threads for work that no device does: the engine's own, where it has any.
+    pub(crate) fn pool(&self) -> Result<Arc<rayon::ThreadPool>, EngineError> {
+        match &self.device {
+            Device::Gpu(_) => Ok(Arc::new(threads::pool(None)?)),
+            Device::Cpu(pool) => Ok(pool.clone()),
         }
     }
 

@@ -27,6 +27,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::quantity::Dtype;
+use crate::threads::ThreadError;
 
 pub use byte_count::ByteCount;
 pub(crate) use pending::available_space;
@@ -86,6 +87,8 @@ pub enum OutputError {
     NoFolder { folder: PathBuf },
     #[error("cannot write {path:?}: {source}")]
     Write { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Threads(#[from] ThreadError),
     #[error("cannot read {path:?}: {source}")]
     Read { path: PathBuf, source: io::Error },
     #[error("{path:?}: {format} files hold {holds}; {remedy}")]
