@@ -4,6 +4,7 @@
 // In the order in which the data pass through them: a room imports only from those above it.
 mod grid;
 #[doc(hidden)]
+pub mod plain_file;
 pub mod suggestion;
 mod threads;
 

@@ -9,7 +9,8 @@ use serde::Serialize;
 use spectroll::evaluation::plot::PictureFormat;
 use spectroll::export::{ArraySelection, Companions, ExportError, Output, SceneExport, Space, Writing};
 use spectroll::output::{OutputError, PendingFile, Schema, SetStatus};
-use spectroll::scene::{GroupSummary, PRESETS, Scene, Workload};
+use spectroll::plain_file::read_text;
+use spectroll::scene::{GroupSummary, MAX_FILE_BYTES, PRESETS, Scene, Workload};
 use spectroll::{Dtype, Engine, Quantity};
 
 use super::exit::Usage;
@@ -148,7 +149,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 fn source(arguments: &Arguments) -> anyhow::Result<(String, String)> {
     match (&arguments.file, &arguments.example) {
         (Some(path), _) => {
-            let text = std::fs::read_to_string(path)
+            let text = read_text(path, MAX_FILE_BYTES)
                 .map_err(|e| Usage(format!("cannot read the scene file {path:?}: {e}")))?;
             Ok((path.display().to_string(), text))
         }

@@ -123,6 +123,7 @@ impl SetWriter {
         if path.is_symlink() {
             path = fs::canonicalize(&path).unwrap_or(path); // the target is replaced, and not the link
         }
+        plan.check(&path)?;
         existing_folder(&path)?;
         let begun = occupy(&path, &plan, shard, start)?;
         let (root, held) = match begun {
