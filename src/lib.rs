@@ -45,7 +45,9 @@ pub mod evaluation;
 
 pub use dataset::{BuiltinTable, Dataset, DatasetError, SpectrumKind, Table};
 pub use draw_status::DrawStatus;
-pub use engine::{Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, adapters};
+pub use engine::{
+    Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, WantedAdapter, adapters,
+};
 pub use grid::{Extrapolation, Grid, GridError};
 pub use model::{BuiltinData, Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};
 pub use program::Bounds;

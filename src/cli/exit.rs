@@ -52,7 +52,7 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
 
 fn of_engine(error: &EngineError) -> u8 {
     match error {
-        EngineError::NoAdapter { .. } | EngineError::NoAdapters => 3,
+        EngineError::NoAdapter { .. } | EngineError::NoAdapters | EngineError::UnknownBackend { .. } => 3,
         _ => 1,
     }
 }

@@ -10,7 +10,7 @@ use spectroll::evaluation::report::{
     Effort, Options, Progress, Report, ReportError, Verdict, figures, measure, page,
 };
 use spectroll::output::{FolderMark, PendingFolder};
-use spectroll::{EngineChoice, adapters};
+use spectroll::{EngineChoice, EngineError, adapters};
 
 use super::exit::Usage;
 use super::interrupt::{self, Interrupted};
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     drop(folder()?);
     let options = Options {
         models,
-        engines: engines(arguments.engine.choice()),
+        engines: engines(arguments.engine.choice())?,
         effort: match (arguments.quick, arguments.full) {
             (true, _) => Effort::Quick,
             (_, true) => Effort::Full,
@@ -112,14 +112,14 @@ fn failures(Verdict { cases, checks, answers }: Verdict) -> String {
 }
 
 /// Every adapter and the CPU, unless one was asked for.
-fn engines(choice: Option<EngineChoice>) -> Vec<EngineChoice> {
-    match choice {
+fn engines(choice: Option<EngineChoice>) -> Result<Vec<EngineChoice>, EngineError> {
+    Ok(match choice {
         Some(choice) => vec![choice],
         None => {
-            let adapters = (0..adapters().len()).map(|i| EngineChoice::Adapter(i.to_string()));
+            let adapters = (0..adapters()?.len()).map(|i| EngineChoice::Adapter(i.to_string()));
             [EngineChoice::Cpu].into_iter().chain(adapters).collect()
         }
-    }
+    })
 }
 
 /// Display of progress.

@@ -110,8 +110,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     output.check_space(&schema, &companions)?;
     let why = match (arguments.engine.choice().unwrap_or_default(), engine.adapter()) {
-        (EngineChoice::Auto, None) => ", no graphics hardware was found",
-        _ => "",
+        (EngineChoice::Auto, None) => match std::env::var("WGPU_BACKEND").unwrap_or_default() {
+            backend if backend.is_empty() => ", no graphics hardware was found".to_owned(),
+            backend => format!(", no graphics hardware was found with WGPU_BACKEND={backend}"),
+        },
+        _ => String::new(),
     };
 
     let files = output.text_files(&schema, &companions);

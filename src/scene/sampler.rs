@@ -4,12 +4,11 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use rayon::ThreadPool;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BufferUsages, Device};
 
 use crate::engine::{DrawSummary, EngineError};
 use crate::quantity::Quantity;
-use crate::sampler::{Prepared, Sampler, SamplerError};
+use crate::sampler::{Prepared, Sampler, SamplerError, filled};
 use crate::threads;
 use crate::wgsl::WORKGROUP;
 
@@ -141,9 +140,9 @@ impl<'a> SceneSampler<'a> {
             copies: plan.count / drawing.places,
             lights: lights.unwrap_or(elements.max(1) as u32),
         };
-        let uniform = filled(device, "spectroll sizes", BufferUsages::UNIFORM, bytemuck::bytes_of(&sizes));
+        let uniform = filled(device, "spectroll sizes", BufferUsages::UNIFORM, bytemuck::bytes_of(&sizes))?;
         let factors = bytemuck::cast_slice(&intensities);
-        let factors = filled(device, "spectroll intensities", BufferUsages::STORAGE, factors);
+        let factors = filled(device, "spectroll intensities", BufferUsages::STORAGE, factors)?;
         let shapes = drawn.buffer(Quantity::Spectra).expect("the program has them");
         let buffers = [&uniform, shapes, &factors, &spectra];
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -184,9 +183,8 @@ impl<'a> SceneSampler<'a> {
         };
         let bands = self.scene.grid.len();
         check(device, (spectra.len() / bands) as u64, bands)?;
-        let label = format!("spectroll {}", plan.name);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let buffer = filled(device, &label, usage, bytemuck::cast_slice(spectra));
+        let buffer = filled(device, "spectroll spectra", usage, bytemuck::cast_slice(spectra))?;
         let values = columns.known(plan);
         Ok(Group { plan, drawn: None, copied: None, spectra: Some(buffer), values })
     }
@@ -274,12 +272,6 @@ fn pipeline(device: &Device) -> wgpu::ComputePipeline {
         compilation_options: wgpu::PipelineCompilationOptions::default(),
         cache: None,
     })
-}
-
-/// A buffer of these bytes; of four zeros where there are none, since a binding is not empty.
-fn filled(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
-    let contents = if bytes.is_empty() { &[0; 4] } else { bytes };
-    device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage })
 }
 
 #[cfg(test)]
