@@ -56,7 +56,7 @@ const RUNS: &[&str] = &[
     #[cfg(feature = "zstd")]
     "sample munsell-vrhel -n 3000 --engine cpu -t 2 -q --chunk 1000 --zstd -o x.zarr",
     #[cfg(feature = "parquet")]
-    "sample munsell-vrhel -n 3000 --engine cpu -t 2 -q --chunk 1000 --format parquet -o x.parts",
+    "sample munsell-vrhel -n 3000 --engine cpu -t 2 -q --chunk 1000 --format parquet -o x/",
 ];
 
 /// The library to preload.

@@ -19,7 +19,7 @@ use super::options::{EngineArguments, OutputArguments, Purpose};
 use super::parse::{counted, grouped, seed, size};
 use super::picture;
 use super::picture::scene::Preview;
-use super::run::{self, folder_of};
+use super::run::{self, Waiting, folder_of};
 
 /// Draw scenes of lights, surfaces and targets, as a file says
 ///
@@ -109,10 +109,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let folder = arguments.file.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
     let selection = ArraySelection { only: arguments.only.clone(), arrays: arguments.arrays.clone() };
+    let waiting = Waiting::begin("preparing the scenes", arguments.quiet);
     let scene = selection.apply(match arguments.seed {
         Some(seed) => Scene::parse_seeded(&name, &text, folder, seed)?,
         None => Scene::parse(&name, &text, folder)?,
     })?;
+    drop(waiting);
     let scenes = arguments.scenes.clone().unwrap_or(0..scene.scenes());
     if scenes.end > scene.scenes() {
         let all = scene.scenes();

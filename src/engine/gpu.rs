@@ -151,9 +151,19 @@ impl<'a> GpuSchedule<'a> {
         steps: u64,
         sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
-        if !self.parts.is_empty() {
-            return self.draw_in_parts(draws, steps, sink);
+        match self.parts.is_empty() {
+            true => self.draw_windows(draws, steps, sink),
+            false => self.draw_in_parts(draws, steps, sink),
         }
+    }
+
+    /// Draws windows of whole steps.
+    fn draw_windows<E: From<EngineError>>(
+        &mut self,
+        draws: &[DrawRange],
+        steps: u64,
+        sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
+    ) -> Result<(), E> {
         self.make_room(draws, steps)?;
         let mut flying = VecDeque::new();
         let mut offset = 0;
@@ -197,7 +207,7 @@ impl<'a> GpuSchedule<'a> {
                 let range = window.of(*draws, job.per_step);
                 let formats = job.sampler.formats();
                 let mut arrays = vec![Vec::new(); formats.len()];
-                part.draw::<EngineError>(&[range], range.count, &mut |batches: &[Batch]| {
+                part.draw_windows::<EngineError>(&[range], range.count, &mut |batches: &[Batch]| {
                     for (array, format) in arrays.iter_mut().zip(formats) {
                         array.extend_from_slice(batches[0].bytes(format.quantity));
                     }
