@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+#[allow(unreachable_pub)] // it is a library there
 #[path = "../fuzz/lib.rs"]
 mod targets;
 

@@ -3,8 +3,8 @@
 #![allow(clippy::duplicate_mod)] // all examples have the host's boilerplate
 
 use spectroll::{
-    Engine, EngineChoice, EngineError, Layout, Model, ProposalKind, Quantity, Recipe, Sampler, SamplerError, Stream,
-    colorimetry,
+    Engine, EngineChoice, EngineError, Layout, Model, ProposalKind, Quantity, Recipe, Sampler, SamplerError,
+    Stream, colorimetry,
     wgpu::{self, BufferUsages},
 };
 
@@ -142,7 +142,11 @@ fn a_lost_device_is_an_error() {
     let error = sampler.prepare(&device, Stream::new(1).draws(0..10)).unwrap_err();
     assert_eq!(error, SamplerError::NoBuffer { label: "spectroll parameters" });
     assert!(error.to_string().contains("it was lost"), "{error}");
-    let covered = Recipe::builder(recipe.model()).proposal(ProposalKind::Cover).lrv(0.98).build().expect("it has a cover");
+    let covered = Recipe::builder(recipe.model())
+        .proposal(ProposalKind::Cover)
+        .lrv(0.98)
+        .build()
+        .expect("it has a cover");
     assert!(matches!(Sampler::new(&device, &covered), Err(SamplerError::NoBuffer { .. })));
     let scene = spectroll::scene::Scene::preset("condition3").expect("it is built in");
     let made = spectroll::scene::SceneSampler::new(&device, &scene);
@@ -161,8 +165,11 @@ fn tables_that_a_device_cannot_bind_are_an_error() {
         limits.max_storage_buffer_binding_size = 4096;
         limits.max_uniform_buffer_binding_size = 4096;
     });
-    let recipe =
-        Recipe::builder(surfaces().model()).proposal(ProposalKind::Cover).lrv(0.98).build().expect("it has a cover");
+    let recipe = Recipe::builder(surfaces().model())
+        .proposal(ProposalKind::Cover)
+        .lrv(0.98)
+        .build()
+        .expect("it has a cover");
     let error = Sampler::new(&device, &recipe).unwrap_err();
     let SamplerError::LargeTable { label, bytes, largest, limit } = error else { panic!("{error}") };
     assert!(label == "spectroll cover" && bytes > 4096 && largest == 4096, "{label} {bytes} {largest}");

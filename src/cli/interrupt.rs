@@ -66,7 +66,7 @@ pub(super) fn around<T>(output: &Output, open: impl FnOnce() -> T) -> T {
             watch();
             opened
         }
-        Destination::File(_) | Destination::SpdFolder => {
+        _ => {
             watch();
             open()
         }

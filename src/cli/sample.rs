@@ -114,7 +114,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     // Who has no graphics hardware knows; who hides it may not.
     let hidden = std::env::var("WGPU_BACKEND").unwrap_or_default();
     let (why, told) = match (arguments.engine.choice().unwrap_or_default(), engine.adapter()) {
-        (EngineChoice::Auto, None) if hidden.is_empty() => (", no graphics hardware was found".to_owned(), false),
+        (EngineChoice::Auto, None) if hidden.is_empty() => {
+            (", no graphics hardware was found".to_owned(), false)
+        }
         (EngineChoice::Auto, None) => {
             (format!(", no graphics hardware was found with WGPU_BACKEND={hidden}"), true)
         }
