@@ -95,7 +95,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             let refusal = gridded.as_ref().err().map(DatasetError::to_string).unwrap_or_default();
             let drawing = picture::look::Picture {
                 name,
-                note: &format!("{}; {}", facts.layout, facts.wavelengths),
+                note: &note(&facts),
                 table: &table,
                 gridded: gridded.as_ref().map_err(|_| refusal.as_str()),
                 kind: arguments.kind.or(table.kind()),
@@ -175,6 +175,13 @@ fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: Grid) -> Fa
     }
 }
 
+/// How a file was read, in a line that fits above a picture.
+fn note(facts: &Facts) -> String {
+    let layout = facts.layout.split(": ").next().unwrap_or_default();
+    let note = format!("{}; {layout}; {} to {} nm", facts.format, short(facts.first_nm), short(facts.last_nm));
+    note.chars().take(100).collect()
+}
+
 /// Everything that is printed of a file.
 fn text(facts: &Facts) -> String {
     let mut text = String::new();
@@ -213,7 +220,7 @@ fn text(facts: &Facts) -> String {
     if !facts.others.is_empty() {
         line(&mut text, "also there", &facts.others.join(", "));
     }
-    for (label, verdict) in [("as reflectances", &facts.as_reflectances), ("as illuminants", &facts.as_illuminants)] {
+    for (label, verdict) in [("reflectances", &facts.as_reflectances), ("illuminants", &facts.as_illuminants)] {
         if let Some(verdict) = verdict {
             line(&mut text, label, verdict);
         }

@@ -429,11 +429,19 @@ fn nothing(path: &Path, arrays: &Arrays, options: &ReadOptions) -> DatasetError 
     });
     match matrices.as_slice() {
         [array] if !has_wave => {
-            let bands = match arrays.order {
-                Order::FirstFirst => array.sides[0],
-                Order::LastFirst => array.sides[0],
-            };
-            DatasetError::NoWavelengths { path: path.to_owned(), bands }
+            let bands = array.sides[0];
+            match &options.fallback {
+                Some(values) => DatasetError::Layout {
+                    path: path.to_owned(),
+                    reason: format!(
+                        "it does not say at which wavelengths its {bands} bands are, and they are not the {} of the model: \
+                         give those of the measurements, as start:step:stop",
+                        values.len()
+                    ),
+                    remedy: Remedy::MeasuredAt,
+                },
+                None => DatasetError::NoWavelengths { path: path.to_owned(), bands },
+            }
         }
         _ => DatasetError::NoMatrix { path: path.to_owned(), found: listed(arrays) },
     }

@@ -70,8 +70,7 @@ fn npy_parts(folder: &Path, parts: &[PathBuf], options: &ReadOptions) -> Result<
 fn manifest_kind(folder: &Path) -> Option<super::SpectrumKind> {
     let bytes = files::read_capped(&folder.join("_manifest.json"), 64 << 20).ok()?;
     let manifest: serde_json::Value = serde_json::from_slice(&bytes).ok()?;
-    let attributes = manifest.get("attributes").unwrap_or(&manifest);
-    arrays::kind(&attributes.to_string())
+    arrays::kind(&manifest["plan"]["attributes"].to_string())
 }
 
 #[cfg(feature = "parquet")]

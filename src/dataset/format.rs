@@ -74,6 +74,11 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
         return Err(unknown(path, "of a type that is unknown, and no text", advice));
     }
     let (decoded, encoding) = text::decode(&bytes);
+    if decoded.trim_start().starts_with('{') {
+        let is_model = decoded.contains("\"weight_covariance\"");
+        let found = if is_model { "a model, fitted already" } else { "JSON" };
+        return Err(unknown(path, found, "expected measured spectra; write them as text, with wavelengths in the first column"));
+    }
     if spdx::begins(&decoded) {
         return spdx::read(path, &decoded);
     }

@@ -31,6 +31,9 @@ impl Arguments {
     /// Compares the data with draws of `seed`; `None` where there are no data.
     pub(super) fn compare(&self, recipe: &Recipe, seed: u64) -> anyhow::Result<Option<Compared>> {
         if !self.is_asked() {
+            if self.reading.is_asked() {
+                return Err(Usage("the options of reading files need some: name them with --data".to_owned()).into());
+            }
             return Ok(None);
         }
         let model = recipe.model();

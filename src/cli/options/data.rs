@@ -126,6 +126,18 @@ impl DataArguments {
         Ok((table, notes))
     }
 
+    /// Whether any setting differs from what is done unless told otherwise.
+    pub(in crate::cli) fn is_asked(&self) -> bool {
+        self.scale != 1.0
+            || self.layout.is_some()
+            || self.unit.is_some()
+            || self.missing != Missing::Error
+            || !self.missing_value.is_empty()
+            || self.separator.is_some()
+            || self.decimal.is_some()
+            || self.skip != 0
+    }
+
     /// Factor of all values.
     pub(in crate::cli) fn scale(&self) -> f64 {
         self.scale

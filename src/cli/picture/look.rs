@@ -59,9 +59,11 @@ impl Picture<'_> {
         }
     }
 
+    /// Colours of the spectra, where all of them can be seen: one that is a hundred times too high would be white.
     fn colours(&self) -> Option<Colours> {
         let kind = self.kind?;
         let data = self.gridded.ok()?;
+        data.judge(kind).ok()?;
         Some(Colours::new(kind, data.grid(), self.theme))
     }
 
