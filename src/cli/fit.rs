@@ -9,6 +9,7 @@ use super::exit::Usage;
 use super::if_exists;
 use super::options::DataArguments;
 use super::parse::{counted, grouped};
+use super::run::Waiting;
 
 /// Fit a model to measured spectra
 ///
@@ -90,7 +91,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(normalize) = arguments.normalize {
         fit = fit.normalization(normalize);
     }
+    let waiting = Waiting::begin("fitting the model", false);
     let model = fit.fit(&data)?;
+    drop(waiting);
     write_file(&arguments.output, if_exists(arguments.force), (model.to_json() + "\n").as_bytes())?;
     if let Ok(counts) = data.judge(kind) {
         unusual(counts);

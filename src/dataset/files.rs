@@ -1,32 +1,21 @@
 //! Files and folders as they are on disk, read within limits.
 
-use std::fs::{self, File};
-use std::io::{Error, ErrorKind, Read};
+use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::{DatasetError, MAX_BYTES};
+use crate::plain_file;
 
 /// Largest number of entries of a folder.
 const MAX_ENTRIES: usize = 200_000;
 
-/// Bytes of a regular file, if they are at most `cap`: a pipe or a device may never end.
+/// Bytes of a regular file, if they are at most `cap`.
 pub(super) fn read_capped(path: &Path, cap: u64) -> Result<Vec<u8>, DatasetError> {
-    let failed = |source| DatasetError::Read { path: path.to_owned(), source };
-    // A pipe is refused before it is opened, which waits for whoever writes to it.
-    let about = fs::metadata(path).map_err(failed)?;
-    if !about.is_file() {
-        let kind = if about.is_dir() { "it is a folder" } else { "it is no regular file" };
-        return Err(failed(Error::new(ErrorKind::InvalidInput, kind)));
-    }
-    if about.len() > cap {
-        return Err(DatasetError::TooLarge { path: path.to_owned() });
-    }
-    let mut bytes = Vec::with_capacity(about.len() as usize + 1);
-    File::open(path).map_err(failed)?.take(cap + 1).read_to_end(&mut bytes).map_err(failed)?;
-    if bytes.len() as u64 > cap {
-        return Err(DatasetError::TooLarge { path: path.to_owned() });
-    }
-    Ok(bytes)
+    plain_file::read(path, cap).map_err(|source| match source.kind() {
+        ErrorKind::FileTooLarge => DatasetError::TooLarge { path: path.to_owned() },
+        _ => DatasetError::Read { path: path.to_owned(), source },
+    })
 }
 
 /// Bytes of a file of data: some, and not too many.
