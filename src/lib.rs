@@ -43,7 +43,10 @@ pub mod export;
 #[doc(hidden)]
 pub mod evaluation;
 
-pub use dataset::{BuiltinTable, Dataset, DatasetError, SpectrumKind, Table};
+pub use dataset::{
+    BuiltinTable, Dataset, DatasetError, Decimal, ReadOptions, Reading, Remedy, Separator, SpectraCounts,
+    SpectrumKind, Table, TableLayout, Unphysical, WavelengthUnit,
+};
 pub use draw_status::DrawStatus;
 pub use engine::{
     Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, WantedAdapter, adapters,

@@ -280,7 +280,7 @@ fn a_model_is_fitted_and_drawn_from() {
         ("fit munsell --wavelengths 380:10:700 -o x.json", 4, "from 400 to 700 nm"),
         ("fit munsell --wavelengths 400:7:700 -o x.json", 2, "whole number of steps"),
         ("fit absent.mat -o x.json", 4, "cannot read \"absent.mat\""),
-        ("fit m.json -o x.json", 4, "unknown type of file"),
+        ("fit m.json -o x.json", 4, "is a model"),
         ("fit munsell -o m.json", 1, "exists already"),
         ("sample lamps.csv -n 5 -o x.npy", 4, "lamps.csv is a file of data: fit a model to it first"),
     ] {
