@@ -41,7 +41,9 @@ pub mod export;
 #[doc(hidden)]
 pub mod evaluation;
 
-pub use dataset::{BuiltinTable, Dataset, DatasetError, SpectrumKind, Table};
+pub use dataset::{
+    BuiltinTable, Dataset, DatasetError, Missing, ResampleMethod, Resampling, SpectrumKind, Table,
+};
 pub use draw_status::DrawStatus;
 pub use engine::{Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, adapters};
 pub use grid::{Extrapolation, Grid, GridError};

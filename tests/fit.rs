@@ -118,7 +118,7 @@ fn the_committed_daylights_are_what_the_measurements_give() {
         let committed = Model::builtin(&format!("granada{suffix}")).expect("it is built in");
         let refitted = fit_granada(&path, grid);
         let (a, b) = (committed.parts(), refitted.parts());
-        assert_eq!((a.kind, a.grid, a.normalization), (b.kind, b.grid, b.normalization));
+        assert_eq!((a.kind, &a.grid, a.normalization), (b.kind, &b.grid, b.normalization));
         let mut errors = vec![(&a.mean - &b.mean).amax(), (&a.weight_mean - &b.weight_mean).amax()];
         errors.extend([(&a.basis - &b.basis).amax(), (&a.weight_covariance - &b.weight_covariance).amax()]);
         errors.extend(a.explained_variance.iter().zip(&b.explained_variance).map(|(a, b)| (a - b).abs()));

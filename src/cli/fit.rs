@@ -83,10 +83,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let tables = arguments
         .files
         .iter()
-        .map(|file| Ok(table(file, arguments.wavelengths)?.scaled(arguments.scale)))
+        .map(|file| Ok(table(file, arguments.wavelengths.clone())?.scaled(arguments.scale)))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let kind = kind(arguments, &tables)?;
-    let data = Dataset::new(&tables, arguments.wavelengths.unwrap_or(Grid::DEFAULT), arguments.extrapolate)?;
+    let data =
+        Dataset::new(&tables, arguments.wavelengths.clone().unwrap_or(Grid::DEFAULT), arguments.extrapolate)?;
     let mut fit = match arguments.components {
         Components::Count(components) => Fit::new(kind).components(components),
         Components::Share(share) => Fit::new(kind).explain(share),

@@ -84,7 +84,7 @@ struct Report {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = arguments.output.resolve(Purpose::of(arguments.dry_run))?;
-    let model = model_at(&arguments.model, arguments.wavelengths)?;
+    let model = model_at(&arguments.model, arguments.wavelengths.as_ref())?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
     let unnamed = Stream::new(arguments.seed);

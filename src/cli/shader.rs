@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let model = model_at(&arguments.model, arguments.wavelengths)?;
+    let model = model_at(&arguments.model, arguments.wavelengths.as_ref())?;
     let recipe = arguments.request.recipe(&model)?;
     let text = recipe.wgsl(&arguments.prefix)?;
     let import = match arguments.naga_oil {

@@ -50,6 +50,18 @@ pub enum DatasetError {
         "spectrum {spectrum} of {name}: the value at {wavelength} nm is {value}; every value must be finite"
     )]
     NotFinite { name: String, spectrum: usize, wavelength: f64, value: f64 },
+    #[error(
+        "spectrum {spectrum} of {name} has no value at {wavelength} nm, which the grid needs; {place}: choose a grid without it, \
+         leave such spectra out{remedy}"
+    )]
+    NotMeasured { name: String, spectrum: usize, wavelength: f64, place: String, remedy: &'static str },
+    #[error(
+        "no spectrum of {name} has every value that the grid needs, the first of them none at {wavelength} nm (spectrum \
+         {spectrum}): choose a grid without it"
+    )]
+    AllDropped { name: String, spectrum: usize, wavelength: f64 },
+    #[error("{a} and {b} were measured at different wavelengths: choose a grid for both")]
+    Grids { a: String, b: String },
     #[error("{name} holds no spectra")]
     NoSpectra { name: String },
     #[error(

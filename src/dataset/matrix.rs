@@ -63,7 +63,7 @@ pub(super) fn choose(
     let path = path.to_owned();
     match (spectra.as_slice(), variable) {
         ([(matrix, grid)], _) => {
-            let mut table = table(&format!("{path:?}:{}", matrix.name), matrix, *grid)?;
+            let mut table = table(&format!("{path:?}:{}", matrix.name), matrix, grid.clone())?;
             table.kind = table.kind.or(kind.filter(|_| DRAWS.contains(&matrix.name.as_str())));
             Ok(table)
         }
@@ -122,5 +122,5 @@ fn grid_of(matrix: &Matrix, samplings: &[(String, Grid)]) -> Option<Grid> {
         [only] => Some(only),
         _ => None,
     })?;
-    (grid.len() == matrix.rows || grid.len() == matrix.columns).then_some(*grid)
+    (grid.len() == matrix.rows || grid.len() == matrix.columns).then(|| grid.clone())
 }

@@ -8,7 +8,8 @@ use nalgebra::DMatrix;
 use super::{DatasetError, MAX_BYTES, SpectrumKind, csv, mat, npy};
 use crate::grid::{self, Grid};
 
-/// Spectra of one source, as measured: increasing wavelengths (nm), finite values.
+/// Spectra of one source, as measured: increasing wavelengths (nm), finite values. A value may be NaN where a spectrum was
+/// not measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// Name in messages: a path and what it takes to find the spectra in that file.
@@ -51,7 +52,7 @@ impl Table {
             return Err(DatasetError::Wavelengths { name, source });
         }
         for (j, spectrum) in spectra.column_iter().enumerate() {
-            if let Some(i) = spectrum.iter().position(|v| !v.is_finite()) {
+            if let Some(i) = spectrum.iter().position(|v| v.is_infinite()) {
                 return Err(DatasetError::NotFinite {
                     name,
                     spectrum: j + 1,
@@ -117,6 +118,12 @@ impl Table {
     /// The wavelengths of the measurements, nm.
     pub fn wavelengths(&self) -> &[f64] {
         &self.wavelengths
+    }
+
+    /// The wavelengths at which any spectrum has a value, nm.
+    pub(super) fn measured_wavelengths(&self) -> Vec<f64> {
+        let rows = self.spectra.row_iter().zip(&self.wavelengths);
+        rows.filter(|(row, _)| row.iter().any(|value| !value.is_nan())).map(|(_, &w)| w).collect()
     }
 
     /// The number of spectra.

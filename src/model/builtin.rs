@@ -1,8 +1,8 @@
 //! The models that are built in, and the data that they are fitted to.
 
 use super::{Fit, Model, ModelError};
-use crate::dataset::{BuiltinTable, Dataset, SpectrumKind, Table};
-use crate::grid::{Extrapolation, Grid};
+use crate::dataset::{BuiltinTable, Dataset, ResampleMethod, Resampling, SpectrumKind, Table};
+use crate::grid::Grid;
 
 /// The measurements behind a built-in model, which [`Model::builtin_at`] fits at the wavelengths that are asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,8 +60,8 @@ impl Model {
     ///
     /// ```
     /// let grid: spectroll::Grid = "380:5:780".parse()?;
-    /// let daylights = spectroll::Model::builtin_at("granada", grid)?;
-    /// assert_eq!((daylights.grid(), daylights.components()), (grid, 6));
+    /// let daylights = spectroll::Model::builtin_at("granada", grid.clone())?;
+    /// assert_eq!((daylights.grid(), daylights.components()), (&grid, 6));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn builtin_at(name: &str, grid: Grid) -> Result<Model, ModelError> {
@@ -89,14 +89,20 @@ fn family(name: &str) -> Result<(Family, Grid), ModelError> {
 
 impl Family {
     fn at(&self, name: &str, grid: Grid) -> Result<Model, ModelError> {
-        if let Some((_, text)) = self.fitted.iter().find(|(fitted, _)| fitted.parse() == Ok(grid)) {
+        if let Some((_, text)) = self.fitted.iter().find(|(fitted, _)| fitted.parse().as_ref() == Ok(&grid)) {
             return Model::from_json(name, text);
         }
         let tables = self.tables();
         let BuiltinData { first, last, .. } = self.data(&tables);
         let name = || name.to_owned();
-        let data = Dataset::new(&tables, grid, Extrapolation::Error)
-            .map_err(|_| ModelError::BuiltinRange { name: name(), first, last, grid })?;
+        // Averages where these data are finer than a grid would change the draws of models that are built in.
+        let settings = Resampling::default().method(ResampleMethod::Interpolate);
+        let data = Dataset::new(&tables, grid.clone(), settings).map_err(|_| ModelError::BuiltinRange {
+            name: name(),
+            first,
+            last,
+            grid: grid.clone(),
+        })?;
         let fit = Fit::new(self.kind).fit(&data);
         fit.map_err(|source| ModelError::BuiltinFit { name: name(), grid, source })
     }

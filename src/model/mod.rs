@@ -196,8 +196,8 @@ impl Model {
     }
 
     /// The wavelengths.
-    pub fn grid(&self) -> Grid {
-        self.parts.grid
+    pub fn grid(&self) -> &Grid {
+        &self.parts.grid
     }
 
     /// The number of wavelengths, n.

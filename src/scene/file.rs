@@ -154,7 +154,7 @@ impl Reader<'_> {
         }
         if let Some(entry) = section.get("wavelengths") {
             let grid = entry.text()?.parse().map_err(|e| entry.wrong(SceneErrorKind::Wavelengths(e)))?;
-            builder = builder.wavelengths(grid);
+            builder = builder.wavelengths(Grid::clone(&grid));
             self.wavelengths = Some(grid);
         }
         let mut groups = Vec::new();
@@ -265,7 +265,9 @@ impl Reader<'_> {
         }
         let path = self.folder.join(name);
         let model = if Model::BUILTIN.contains(&name) {
-            self.wavelengths.map_or_else(|| Model::builtin(name), |grid| Model::builtin_at(name, grid))
+            self.wavelengths
+                .clone()
+                .map_or_else(|| Model::builtin(name), |grid| Model::builtin_at(name, grid))
         } else if path.is_file() {
             Model::load(&path)
         } else {
@@ -287,7 +289,7 @@ impl Reader<'_> {
         };
         let wrong = |e: DatasetError| entry.wrong(SceneErrorKind::Mean(e));
         let tables = [table.map_err(wrong)?];
-        let data = Dataset::new(&tables, grid, Extrapolation::Error).map_err(wrong)?;
+        let data = Dataset::new(&tables, grid.clone(), Extrapolation::Error).map_err(wrong)?;
         let found = data.spectra().ncols();
         if found != 1 {
             return Err(entry.wrong(SceneErrorKind::Means { found }));

@@ -34,8 +34,9 @@ impl Arguments {
             return Ok(None);
         }
         let model = recipe.model();
-        let table =
-            |name: &String| anyhow::Ok(crate::cli::fit::table(name, Some(model.grid()))?.scaled(self.scale));
+        let table = |name: &String| {
+            anyhow::Ok(crate::cli::fit::table(name, Some(model.grid().clone()))?.scaled(self.scale))
+        };
         let tables = self.data.iter().map(table).collect::<anyhow::Result<Vec<Table>>>()?;
         if let Some(other) = tables.iter().find(|table| table.kind().is_some_and(|kind| kind != model.kind()))
         {
@@ -46,7 +47,7 @@ impl Arguments {
             ))
             .into());
         }
-        let data = Dataset::new(&tables, model.grid(), Extrapolation::Error)?;
+        let data = Dataset::new(&tables, model.grid().clone(), Extrapolation::Error)?;
         let mean = data.spectra().mean();
         if model.kind() == SpectrumKind::Reflectance && mean > 1.0 {
             return Err(Usage(format!(

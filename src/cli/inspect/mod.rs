@@ -59,7 +59,7 @@ pub(crate) struct Arguments {
 /// Prints the table, after making the picture where one is asked for.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
-    let model = super::model_at(&arguments.model, arguments.wavelengths)?;
+    let model = super::model_at(&arguments.model, arguments.wavelengths.as_ref())?;
     let recipe = arguments.request.recipe(&model);
     let compared = match &recipe {
         Ok(recipe) => arguments.data.compare(recipe, arguments.seed)?,

@@ -182,7 +182,7 @@ fn data(bench: &Bench, name: &str, model: &Model) -> Option<DataComparison> {
         _ => return None,
     };
     let tables: Vec<Table> = sources.iter().map(|table| table.table()).collect();
-    let data = Dataset::new(&tables, model.grid(), Extrapolation::Error).ok()?;
+    let data = Dataset::new(&tables, model.grid().clone(), Extrapolation::Error).ok()?;
     let recipe = Recipe::builder(model).build().ok()?;
     let draws = bench.effort.pick(10_000, 50_000, 200_000);
     let comparison = Comparison::new(&recipe, &data, Stream::named(bench.seed, "data"), draws).ok()?;
