@@ -129,6 +129,9 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
     match error.downcast_ref::<DatasetError>() {
         Some(DatasetError::NoWavelengths { .. }) => " (--wavelengths)",
         Some(DatasetError::Range { .. }) => " (--wavelengths, --extrapolate)",
+        Some(DatasetError::NotMeasured { remedy: "", .. }) => " (--wavelengths, --missing drop)",
+        Some(DatasetError::NotMeasured { .. }) => " (--wavelengths, --missing drop or interpolate)",
+        Some(DatasetError::AllDropped { .. } | DatasetError::Grids { .. }) => " (--wavelengths)",
         _ if matches!(error.downcast_ref(), Some(ModelError::BuiltinRange { .. })) => {
             " (--wavelengths; `spectroll fit` takes other data)"
         }

@@ -4,21 +4,25 @@ use std::path::{Path, PathBuf};
 
 use spectroll::output::write_file;
 use spectroll::suggestion::closest;
-use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, Grid, Model, Normalization, SpectrumKind, Table};
+use spectroll::{
+    BuiltinTable, Dataset, Extrapolation, Fit, Grid, Missing, Model, Normalization, ResampleMethod,
+    Resampling, SpectrumKind, Table,
+};
 
 use super::exit::Usage;
 use super::if_exists;
 use super::parse::grouped;
+use super::wavelengths::{Wavelengths, wavelengths};
 
 /// Fit a model to measured spectra
 ///
 /// Files are MATLAB's (a matrix X of spectra in columns, and S_X = [start step count] or a vector wavelength beside it;
 /// FILE.mat:X picks one of several), .h5 (the same, spectra in rows), CSV (wavelengths in the first column, a spectrum
-/// in each other one) or .npy (spectra in rows, at --wavelengths). The names munsell, vrhel and granada stand for
+/// in each other one) or .npy (spectra in rows, at --wavelengths). The names munsell, vrhel, granada and others stand for
 /// built-in tables. Several are fitted together.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Files of spectra, or munsell, vrhel, granada
+    /// Files of spectra, or munsell, vrhel, granada, macbeth, koivisto, krinov, houser
     #[arg(required = true, value_name = "FILE")]
     files: Vec<String>,
     /// The number of components, or the share of the variance that they must explain, as in 99.9%
@@ -28,9 +32,16 @@ pub(crate) struct Arguments {
     /// Kind of the spectra [default: as the name of the variable says: sur_X, spd_X, daylightX]
     #[arg(long, value_enum)]
     kind: Option<SpectrumKind>,
-    /// The wavelengths, start:step:stop in nm [default: 400:10:700]
-    #[arg(long, value_name = "GRID")]
-    wavelengths: Option<Grid>,
+    /// The wavelengths of the model, in nm: start:step:stop, a list as in 443,490,560, a file of them, or as-measured
+    /// [default: 400:10:700]
+    #[arg(long, value_name = "GRID|FILE|as-measured", value_parser = wavelengths)]
+    wavelengths: Option<Wavelengths>,
+    /// Bring data to these wavelengths by
+    #[arg(long, value_enum, default_value = "auto")]
+    resample: ResampleMethod,
+    /// Treat spectra that lack a value which these wavelengths need as
+    #[arg(long, value_enum, default_value = "error")]
+    missing: Missing,
     /// Multiply the data by this: 0.01 makes reflectances of percentages
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR", value_parser = factor,
           allow_negative_numbers = true)]
@@ -80,14 +91,25 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ))
         .into());
     }
+    let given = match &arguments.wavelengths {
+        Some(Wavelengths::Grid(grid)) => Some(grid.clone()),
+        Some(Wavelengths::AsMeasured) | None => None,
+    };
     let tables = arguments
         .files
         .iter()
-        .map(|file| Ok(table(file, arguments.wavelengths.clone())?.scaled(arguments.scale)))
+        .map(|file| Ok(table(file, given.clone())?.scaled(arguments.scale)))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let kind = kind(arguments, &tables)?;
-    let data =
-        Dataset::new(&tables, arguments.wavelengths.clone().unwrap_or(Grid::DEFAULT), arguments.extrapolate)?;
+    let grid = match &arguments.wavelengths {
+        Some(Wavelengths::AsMeasured) => Dataset::measured_grid(&tables)?,
+        _ => given.unwrap_or(Grid::DEFAULT),
+    };
+    let settings = Resampling::default()
+        .method(arguments.resample)
+        .extrapolation(arguments.extrapolate)
+        .missing(arguments.missing);
+    let data = Dataset::new(&tables, grid, settings)?;
     let mut fit = match arguments.components {
         Components::Count(components) => Fit::new(kind).components(components),
         Components::Share(share) => Fit::new(kind).explain(share),
@@ -112,6 +134,9 @@ fn report(model: &Model, data: &Dataset, path: &Path) {
         model.kind(),
         model.grid(),
     );
+    for note in data.notes() {
+        tell!("  {note}");
+    }
 }
 
 /// The table of a built-in name, a file, or file:variable; at these wavelengths where the file does not say.
@@ -137,9 +162,10 @@ fn no_data(name: &str) -> String {
              START:STEP:STOP` fits it at another grid"
         );
     }
-    let tables = BuiltinTable::ALL.iter().map(|table| table.name());
-    let meant = closest(name, tables).map_or(String::new(), |meant| format!(", did you mean {meant}?"));
-    format!("{name:?} is neither a file nor a built-in table (munsell, vrhel, granada){meant}")
+    let tables = || BuiltinTable::ALL.iter().map(|table| table.name());
+    let known = tables().collect::<Vec<_>>().join(", ");
+    let meant = closest(name, tables()).map_or(String::new(), |meant| format!(", did you mean {meant}?"));
+    format!("{name:?} is neither a file nor a built-in table ({known}){meant}")
 }
 
 /// Kind of the spectra: as asked, else as their names say, if those agree.

@@ -27,6 +27,7 @@ mod sample;
 mod scene;
 mod shader;
 mod verify;
+mod wavelengths;
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -18,6 +18,8 @@ pub struct BuiltinData {
     pub last: f64,
     /// The step at which all of them were measured, nm; a finer grid is interpolated.
     pub step: f64,
+    /// The tables that hold them.
+    pub tables: &'static [BuiltinTable],
 }
 
 /// A family of built-in models: the same data at different wavelengths.
@@ -26,12 +28,19 @@ struct Family {
     tables: &'static [BuiltinTable],
     /// Models that were fitted once: a fit made now could differ in its last digits, and so would every draw of it.
     fitted: &'static [(&'static str, &'static str)],
+    /// The grid of the model unless another is asked for.
+    grid: &'static str,
+    /// Averages of data where they are finer than a grid would change the draws of the models that came first; lamps with
+    /// lines need them.
+    method: ResampleMethod,
 }
 
 const MUNSELL_VRHEL: Family = Family {
     kind: SpectrumKind::Reflectance,
     tables: &[BuiltinTable::Munsell, BuiltinTable::Vrhel],
     fitted: &[],
+    grid: "400:10:700",
+    method: ResampleMethod::Interpolate,
 };
 
 const GRANADA: Family = Family {
@@ -41,14 +50,39 @@ const GRANADA: Family = Family {
         ("400:10:700", include_str!("../../data/granada.json")),
         ("400:5:700", include_str!("../../data/granada-5nm.json")),
     ],
+    grid: "400:10:700",
+    method: ResampleMethod::Interpolate,
+};
+
+const MACBETH: Family = Family { tables: &[BuiltinTable::Macbeth], ..MUNSELL_VRHEL };
+
+const KOIVISTO: Family = Family { tables: &[BuiltinTable::Koivisto], ..MUNSELL_VRHEL };
+
+const KRINOV: Family = Family { tables: &[BuiltinTable::Krinov], grid: "400:10:650", ..MUNSELL_VRHEL };
+
+const HOUSER: Family = Family {
+    kind: SpectrumKind::Illuminant,
+    tables: &[BuiltinTable::Houser],
+    method: ResampleMethod::Average,
+    ..MUNSELL_VRHEL
 };
 
 impl Model {
-    /// The names of the built-in models. `-5nm` is the grid 400:5:700, the others are at 400:10:700.
-    pub const BUILTIN: &[&str] = &["munsell-vrhel", "granada", "munsell-vrhel-5nm", "granada-5nm"];
+    /// The names of the built-in models. `-5nm` is the grid 400:5:700, `krinov` is at 400:10:650 and the others are at
+    /// 400:10:700.
+    pub const BUILTIN: &[&str] = &[
+        "munsell-vrhel",
+        "granada",
+        "munsell-vrhel-5nm",
+        "granada-5nm",
+        "macbeth",
+        "koivisto",
+        "krinov",
+        "houser",
+    ];
 
-    /// A built-in model: `munsell-vrhel` (reflectances, fitted here to the compiled-in tables) or `granada`
-    /// (daylights, fitted once to the measurements of Hernández-Andrés et al. 2001), with or without `-5nm`.
+    /// A built-in model: `granada` (daylights, with or without `-5nm`) was fitted once to the measurements of
+    /// Hernández-Andrés et al. 2001; the others are fitted here to the compiled-in tables ([`BuiltinTable`]).
     pub fn builtin(name: &str) -> Result<Model, ModelError> {
         let (family, grid) = family(name)?;
         family.at(name, grid)
@@ -77,14 +111,21 @@ impl Model {
 
 /// The family of a name, and the grid that the name stands for.
 fn family(name: &str) -> Result<(Family, Grid), ModelError> {
-    let fine = Grid::new(400.0, 5.0, 61)?;
-    match name {
-        "munsell-vrhel" => Ok((MUNSELL_VRHEL, Grid::DEFAULT)),
-        "munsell-vrhel-5nm" => Ok((MUNSELL_VRHEL, fine)),
-        "granada" => Ok((GRANADA, Grid::DEFAULT)),
-        "granada-5nm" => Ok((GRANADA, fine)),
-        _ => Err(ModelError::NoBuiltin { name: name.to_owned() }),
-    }
+    let (family, suffix) = match name.strip_suffix("-5nm") {
+        Some(family) => (family, true),
+        None => (name, false),
+    };
+    let found = match (family, suffix) {
+        ("munsell-vrhel", _) => MUNSELL_VRHEL,
+        ("granada", _) => GRANADA,
+        ("macbeth", false) => MACBETH,
+        ("koivisto", false) => KOIVISTO,
+        ("krinov", false) => KRINOV,
+        ("houser", false) => HOUSER,
+        _ => return Err(ModelError::NoBuiltin { name: name.to_owned() }),
+    };
+    let grid = if suffix { "400:5:700" } else { found.grid };
+    Ok((found, grid.parse()?))
 }
 
 impl Family {
@@ -95,8 +136,7 @@ impl Family {
         let tables = self.tables();
         let BuiltinData { first, last, .. } = self.data(&tables);
         let name = || name.to_owned();
-        // Averages where these data are finer than a grid would change the draws of models that are built in.
-        let settings = Resampling::default().method(ResampleMethod::Interpolate);
+        let settings = Resampling::default().method(self.method);
         let data = Dataset::new(&tables, grid.clone(), settings).map_err(|_| ModelError::BuiltinRange {
             name: name(),
             first,
@@ -117,6 +157,7 @@ impl Family {
         };
         BuiltinData {
             kind: self.kind,
+            tables: self.tables,
             spectra: tables.iter().map(Table::len).sum(),
             first: most(&|wavelengths| wavelengths[0]),
             last: -most(&|wavelengths| -wavelengths[wavelengths.len() - 1]),

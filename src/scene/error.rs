@@ -203,6 +203,9 @@ fn quantities() -> String {
 }
 
 fn same_grid(model: &Grid) -> String {
+    if model.to_string().parse().as_ref() != Ok(model) {
+        return "leave out wavelengths, or name a model on the scene's".to_owned();
+    }
     format!(
         "set wavelengths = \"{model}\", or name a model on the scene's (some built-in ones end in -5nm; \
          others can be fitted)"

@@ -153,8 +153,12 @@ impl Reader<'_> {
             builder = builder.seed(entry.whole()?);
         }
         if let Some(entry) = section.get("wavelengths") {
-            let grid = entry.text()?.parse().map_err(|e| entry.wrong(SceneErrorKind::Wavelengths(e)))?;
-            builder = builder.wavelengths(Grid::clone(&grid));
+            let grid = match entry.list() {
+                Some(list) => Grid::from_wavelengths(&list?),
+                None => entry.text()?.parse(),
+            };
+            let grid = grid.map_err(|e| entry.wrong(SceneErrorKind::Wavelengths(e)))?;
+            builder = builder.wavelengths(grid.clone());
             self.wavelengths = Some(grid);
         }
         let mut groups = Vec::new();

@@ -14,7 +14,8 @@ const DRAWS: u64 = 20_000;
 /// Data to compare draws with.
 #[derive(clap::Args)]
 pub(super) struct Arguments {
-    /// Compare the draws with these measured spectra: files as `fit` reads them, or munsell, vrhel, granada
+    /// Compare the draws with these measured spectra: files as `fit` reads them, or the
+    /// name of a built-in table
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<String>,
     /// Multiply the data by this, as `fit --scale`
