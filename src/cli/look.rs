@@ -14,6 +14,7 @@ use super::exit::Usage;
 use super::inspect::line;
 use super::options::DataArguments;
 use super::parse::{counted, grouped};
+use super::wavelengths::grid;
 use super::{if_exists, picture};
 
 /// Show how files of spectra are read, before anything is fitted to them
@@ -25,8 +26,9 @@ pub(crate) struct Arguments {
     /// Kind of the spectra [default: as the file says, else both are tried]
     #[arg(long, value_enum)]
     kind: Option<SpectrumKind>,
-    /// The wavelengths of the model that the spectra are for, start:step:stop in nm [default: 400:10:700]
-    #[arg(long, value_name = "GRID")]
+    /// The wavelengths of the model that the spectra are for, in nm: start:step:stop, a list, or a file of them
+    /// [default: 400:10:700]
+    #[arg(long, value_name = "GRID|FILE", value_parser = grid)]
     wavelengths: Option<Grid>,
     /// Draw the spectra of one file, as measured and on the grid, into this file: .svg, .png or .pdf
     #[arg(short, long, value_name = "PATH")]
@@ -80,18 +82,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.output.is_some() && arguments.files.len() > 1 {
         return Err(Usage(format!("-o draws one file, and there are {}: look at them one by one", arguments.files.len())).into());
     }
-    let grid = arguments.wavelengths.unwrap_or(Grid::DEFAULT);
+    let grid = arguments.wavelengths.clone().unwrap_or(Grid::DEFAULT);
     let mut all = Vec::new();
     for name in &arguments.files {
         let reading = match spectroll::BuiltinTable::named(name) {
             Some(builtin) => Reading::builtin(builtin),
-            None => arguments.data.read(name, arguments.wavelengths)?,
+            None => arguments.data.read(name, arguments.wavelengths.as_ref())?,
         };
         let scale = arguments.data.scale();
-        let facts = facts(name, &reading, arguments, grid);
+        let facts = facts(name, &reading, arguments, &grid);
         if let (Some(path), Some(format)) = (&arguments.output, format) {
             let table = reading.table.clone().scaled(scale);
-            let gridded = Dataset::new(std::slice::from_ref(&table), grid, Extrapolation::Error);
+            let gridded = Dataset::new(std::slice::from_ref(&table), grid.clone(), Extrapolation::Error);
             let refusal = gridded.as_ref().err().map(DatasetError::to_string).unwrap_or_default();
             let drawing = picture::look::Picture {
                 name,
@@ -114,7 +116,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: Grid) -> Facts {
+fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: &Grid) -> Facts {
     let table = &reading.table;
     let wavelengths = table.wavelengths();
     let steps: Vec<f64> = wavelengths.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -135,9 +137,9 @@ fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: Grid) -> Fa
     let judged = |of: SpectrumKind| {
         kind.is_none_or(|kind| kind == of).then(|| {
             let judge = || -> anyhow::Result<String> {
-                let data = Dataset::new(std::slice::from_ref(&scaled), grid, Extrapolation::Error)?;
+                let data = Dataset::new(std::slice::from_ref(&scaled), grid.clone(), Extrapolation::Error)?;
                 let counts = data.judge(of)?;
-                let mut said = Vec::new();
+                let mut said = data.notes().to_vec();
                 for (count, values) in [(counts.above_one, "above 1"), (counts.below_zero, "below 0")] {
                     if count > 0 {
                         said.push(format!("{} with values {values}", counted(count as u64, "spectrum", "spectra")));

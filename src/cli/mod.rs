@@ -28,6 +28,7 @@ mod sample;
 mod scene;
 mod shader;
 mod verify;
+mod wavelengths;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -142,10 +143,10 @@ fn model(name: &str) -> anyhow::Result<Model> {
 }
 
 /// The model of a name, where a built-in one is fitted at the grid that is asked for.
-fn model_at(name: &str, grid: Option<Grid>) -> anyhow::Result<Model> {
+fn model_at(name: &str, grid: Option<&Grid>) -> anyhow::Result<Model> {
     if Model::BUILTIN.contains(&name) {
         return Ok(match grid {
-            Some(grid) => Model::builtin_at(name, grid)?,
+            Some(grid) => Model::builtin_at(name, grid.clone())?,
             None => Model::builtin(name)?,
         });
     }
@@ -161,7 +162,7 @@ fn model_at(name: &str, grid: Option<Grid>) -> anyhow::Result<Model> {
         }
         other => other.into(),
     })?;
-    if let Some(grid) = grid.filter(|grid| *grid != model.grid()) {
+    if let Some(grid) = grid.filter(|&grid| grid != model.grid()) {
         anyhow::bail!(Usage(format!(
             "--wavelengths {grid}: the grid belongs to the model {name:?}, and is {}: fit it with spectroll fit \
              --wavelengths",

@@ -153,7 +153,7 @@ impl Fit {
         let variances = singular.rows(0, k).map(|s| s * s / spectra as f64);
         Ok(Model::new(ModelParts {
             kind: self.kind,
-            grid: data.grid(),
+            grid: data.grid().clone(),
             mean,
             basis: basis.rows(0, k).into_owned(),
             weight_mean: DVector::zeros(k),
@@ -189,12 +189,15 @@ impl Normalization {
     }
 
     /// Divisor of a spectrum on this grid: 1 for [`None`](Normalization::None).
-    pub fn divisor(self, spectrum: &[f64], grid: Grid) -> f64 {
+    pub fn divisor(self, spectrum: &[f64], grid: &Grid) -> f64 {
         let spectrum = DVectorView::from_slice(spectrum, spectrum.len());
         match self {
             Normalization::None => 1.0,
             Normalization::Mean => spectrum.mean(),
-            Normalization::Integral => spectrum.sum() * grid.step(),
+            Normalization::Integral => match grid.step() {
+                Some(step) => spectrum.sum() * step,
+                None => spectrum.iter().zip(grid.widths()).map(|(value, width)| value * width).sum(),
+            },
         }
     }
 }

@@ -15,7 +15,8 @@ const DRAWS: u64 = 20_000;
 /// Data to compare draws with.
 #[derive(clap::Args)]
 pub(super) struct Arguments {
-    /// Compare the draws with these measured spectra: files as `fit` reads them, or munsell, vrhel, granada
+    /// Compare the draws with these measured spectra: files as `fit` reads them, or the
+    /// name of a built-in table
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<String>,
     #[command(flatten)]
@@ -39,7 +40,7 @@ impl Arguments {
         let model = recipe.model();
         let mut tables: Vec<Table> = Vec::new();
         for name in &self.data {
-            let (table, notes) = self.reading.table(name, Some(model.grid()), model.grid())?;
+            let (table, notes) = self.reading.table(name, Some(model.grid()))?;
             notes.iter().for_each(|note| tell!("{}: {note}", table.name()));
             tables.push(table);
         }
@@ -52,7 +53,7 @@ impl Arguments {
             ))
             .into());
         }
-        let data = Dataset::new(&tables, model.grid(), Extrapolation::Error)?;
+        let data = Dataset::new(&tables, model.grid().clone(), Extrapolation::Error)?;
         let mean = data.spectra().mean();
         if model.kind() == SpectrumKind::Reflectance && mean > 1.0 {
             return Err(Usage(format!(

@@ -129,7 +129,7 @@ impl Picture<'_> {
             }
         };
         let grid = data.grid();
-        let axes = Axes { kind: self.kind.unwrap_or(SpectrumKind::Illuminant), grid, theme: self.theme };
+        let axes = Axes { kind: self.kind.unwrap_or(SpectrumKind::Illuminant), grid: grid.clone(), theme: self.theme };
         let colours = self.colours();
         let shown = self.shown();
         let line = |(of, index): (usize, &usize)| {
