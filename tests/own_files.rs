@@ -15,7 +15,7 @@ fn model_of_draws() -> Model {
     let source = Model::builtin("munsell-vrhel").expect("it is built in");
     let recipe = Recipe::builder(&source).build().expect("a recipe");
     let spectra: Vec<Vec<f64>> = (0..DRAWS)
-        .map(|i| recipe.draw(Stream::new(5), i).spectrum().iter().map(|&v| f64::from(v as f32)).collect())
+        .map(|i| recipe.draw::<f32>(Stream::new(5), i).spectrum().iter().map(|&v| f64::from(v)).collect())
         .collect();
     let table = Table::new("draws", source.grid().wavelengths().collect(), &spectra).expect("a table");
     let data = Dataset::new(&[table], source.grid(), Extrapolation::Error).expect("they are on the grid");
