@@ -18,7 +18,7 @@ fn model_of_draws() -> Model {
         .map(|i| recipe.draw::<f32>(Stream::new(5), i).spectrum().iter().map(|&v| f64::from(v)).collect())
         .collect();
     let table = Table::new("draws", source.grid().wavelengths().collect(), &spectra).expect("a table");
-    let data = Dataset::new(&[table], source.grid(), Extrapolation::Error).expect("they are on the grid");
+    let data = Dataset::new(&[table], source.grid().clone(), Extrapolation::Error).expect("they are on the grid");
     Fit::new(SpectrumKind::Reflectance).components(3).fit(&data).expect("they vary")
 }
 
