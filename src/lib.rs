@@ -4,7 +4,9 @@
 // In the order in which the data pass through them: a room imports only from those above it.
 mod grid;
 #[doc(hidden)]
+pub mod plain_file;
 pub mod suggestion;
+mod threads;
 
 mod dataset;
 
@@ -45,7 +47,9 @@ pub use dataset::{
     BuiltinTable, Dataset, DatasetError, Missing, ResampleMethod, Resampling, SpectrumKind, Table,
 };
 pub use draw_status::DrawStatus;
-pub use engine::{Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, adapters};
+pub use engine::{
+    Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, WantedAdapter, adapters,
+};
 pub use grid::{Extrapolation, Grid, GridError};
 pub use model::{BuiltinData, Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};
 pub use program::Bounds;
@@ -58,6 +62,7 @@ pub use recipe::{
     RecipeError, RecipeSettings, ScalarSampler, XyzScale,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
+pub use threads::ThreadError;
 // What stands in signatures, so that hosts take the same versions.
 pub use wgsl::WgslError;
 pub use {half, nalgebra, rand, wgpu};

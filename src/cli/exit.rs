@@ -52,17 +52,23 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
 
 fn of_engine(error: &EngineError) -> u8 {
     match error {
-        EngineError::NoAdapter { .. } | EngineError::NoAdapters => 3,
+        EngineError::NoAdapter { .. } | EngineError::NoAdapters | EngineError::UnknownBackend { .. } => 3,
         _ => 1,
     }
 }
 
 fn of_output(error: &OutputError) -> u8 {
     use OutputError::{
-        Cannot, Damaged, DamagedParts, Manifest, NotBuilt, NotStreamed, UnknownFormat, Unrepaired,
+        Cannot, Damaged, DamagedParts, LargeChunks, Manifest, ManyChunks, NotBuilt, NotStreamed,
+        UnknownFormat, Unrepaired,
     };
     match error {
-        UnknownFormat { .. } | Cannot { .. } | NotBuilt { .. } | NotStreamed => 2,
+        UnknownFormat { .. }
+        | Cannot { .. }
+        | NotBuilt { .. }
+        | NotStreamed
+        | ManyChunks { .. }
+        | LargeChunks { .. } => 2,
         Damaged { .. } | DamagedParts { .. } | Manifest { .. } | Unrepaired { .. } => 5,
         _ => 1,
     }
@@ -99,6 +105,7 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             OutputError::NothingMade { .. } => ": make each with --shard I/N --resume",
             OutputError::Unfinished { .. } => " (--resume or --force)",
             OutputError::NoSpace { .. } => " (--force-space overrides)",
+            OutputError::ManyChunks { .. } | OutputError::LargeChunks { .. } => " (--chunk)",
             OutputError::NotStreamed => " (--format csv or npy)",
             OutputError::Cannot { remedy, .. } if remedy.contains("quantity") => " (--quantities)",
             OutputError::Cannot { holds: "spectra", remedy: "choose spectra alone", .. } => " (--quantities)",

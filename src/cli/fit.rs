@@ -12,6 +12,7 @@ use spectroll::{
 use super::exit::Usage;
 use super::if_exists;
 use super::parse::grouped;
+use super::run::Waiting;
 use super::wavelengths::{Wavelengths, wavelengths};
 
 /// Fit a model to measured spectra
@@ -117,7 +118,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(normalize) = arguments.normalize {
         fit = fit.normalization(normalize);
     }
+    let waiting = Waiting::begin("fitting the model", false);
     let model = fit.fit(&data)?;
+    drop(waiting);
     write_file(&arguments.output, if_exists(arguments.force), (model.to_json() + "\n").as_bytes())?;
     report(&model, &data, &arguments.output);
     Ok(())

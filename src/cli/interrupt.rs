@@ -56,17 +56,21 @@ pub(super) fn watch_once() {
 }
 
 /// Opens an output, and watches from when that should not be ended by the signal itself. Checking what is there of a set
-/// may take minutes and be ended at any moment; a file that is begun may not.
+/// may take minutes and be ended at any moment; a file that is begun may not. Standard output may: it leaves nothing to
+/// remove, and whoever does not read it would never let the signal be seen.
 pub(super) fn around<T>(output: &Output, open: impl FnOnce() -> T) -> T {
-    let is_set = matches!(output.destination(), Destination::Set(_));
-    if !is_set {
-        watch();
+    match output.destination() {
+        Destination::Stdout(_) => open(),
+        Destination::Set(_) => {
+            let opened = open();
+            watch();
+            opened
+        }
+        _ => {
+            watch();
+            open()
+        }
     }
-    let opened = open();
-    if is_set {
-        watch();
-    }
-    opened
 }
 
 /// Whether a signal is ignored, as far as Linux tells.

@@ -8,6 +8,7 @@ use super::{Batch, EngineError};
 use crate::cpu::{self, Kernel};
 use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::DrawRange;
+use crate::threads;
 
 /// Number of windows: one with the caller, one being computed, one between them.
 const WINDOWS: usize = 3;
@@ -83,7 +84,8 @@ impl<'a> CpuSchedule<'a> {
         }
         let (pool, pace) = (self.pool, &mut self.pace);
         std::thread::scope(|scope| {
-            let computing = scope.spawn(move || compute(pool, jobs, pace, (draws, steps), emptied, full));
+            let work = move || compute(pool, jobs, pace, (draws, steps), emptied, full);
+            let computing = threads::spawn_scoped(scope, work).map_err(EngineError::from)?;
             // Dropped before the thread is waited for, which might itself be waiting for a window.
             let empty = empty;
             for (window, room) in filled {

@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
+use rayon::ThreadPool;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -34,6 +36,8 @@ pub struct SceneSession<'a> {
     schedule: Option<Schedule<'a>>,
     /// Spectra of each group that were drawn once.
     once: Vec<Option<SharedSpectra>>,
+    /// Threads for what the engine does not draw.
+    pool: Arc<ThreadPool>,
 }
 
 /// Summary of a group's draws.
@@ -91,10 +95,11 @@ impl Scene {
             .map(|drawing| Job { recipe: &drawing.recipe, per_step: drawing.places.into() })
             .collect();
         let schedule = (!members.is_empty()).then(|| engine.schedule(&members)).transpose()?;
-        Ok(SceneSession { scene: self, schedule, once: self.once()? })
+        let pool = engine.pool()?;
+        Ok(SceneSession { scene: self, schedule, once: pool.install(|| self.once())?, pool })
     }
 
-    /// Draws the spectra that serve all scenes, for each group.
+    /// Draws the spectra that serve all scenes, for each group, in the rayon pool that it is called in.
     pub(super) fn once(&self) -> Result<Vec<Option<SharedSpectra>>, EngineError> {
         let once = |plan: &GroupPlan| match &plan.shapes {
             Shapes::Once(drawing) => SharedSpectra::new(plan, drawing).map(Some),
@@ -174,7 +179,7 @@ impl SceneSession<'_> {
         scenes: Range<u64>,
         mut sink: impl FnMut(Window) -> Result<(), E>,
     ) -> Result<Vec<GroupSummary>, E> {
-        let (scene, once) = (self.scene, &self.once);
+        let (scene, once, pool) = (self.scene, &self.once, &self.pool);
         let none = |plan: &GroupPlan| GroupSummary { group: plan.name.clone(), ..GroupSummary::default() };
         let mut summaries: Vec<_> = scene.plans.iter().map(none).collect();
         let (first, mut next) = (scenes.start, scenes.start);
@@ -186,8 +191,8 @@ impl SceneSession<'_> {
             for ((plan, once), summary) in scene.plans.iter().zip(once).zip(&mut summaries) {
                 let drawing = plan.drawn_by_engine();
                 let batch = drawing.and_then(|drawing| batches.next().map(|batch| (drawing, batch)));
-                let columns =
-                    columns(plan, once.as_ref(), batch, (first, part.clone()), &mut summary.summary)?;
+                let (once, scenes) = (once.as_ref(), (first, part.clone()));
+                let columns = pool.install(|| columns(plan, once, batch, scenes, &mut summary.summary))?;
                 arrays.extend(columns.arrays(plan));
             }
             sink(Window { scenes: part, arrays })
@@ -223,7 +228,7 @@ impl SceneSession<'_> {
 }
 
 /// The columns of a group in some scenes, of a run whose first scene is `first`. What scenes share is counted in the
-/// first of them that the run has.
+/// first of them that the run has. Works in the rayon pool that it is called in.
 pub(super) fn columns<'a>(
     plan: &'a GroupPlan,
     once: Option<&'a SharedSpectra>,

@@ -28,6 +28,7 @@ use super::OutputError;
 use super::lock::LockFile;
 use super::pending::{existing_folder, place};
 use super::sum::Sum;
+use crate::threads;
 pub use audit::{Fault, Piece, SetAudit};
 pub use layout::ChunkFormat;
 use layout::Part;
@@ -122,6 +123,7 @@ impl SetWriter {
         if path.is_symlink() {
             path = fs::canonicalize(&path).unwrap_or(path); // the target is replaced, and not the link
         }
+        plan.check(&path)?;
         existing_folder(&path)?;
         let begun = occupy(&path, &plan, shard, start)?;
         let (root, held) = match begun {
@@ -139,14 +141,15 @@ impl SetWriter {
             let is_sound = |(_, sums): &(u64, Vec<Sum>)| {
                 held.is_none() || sums.iter().all(|sum| sum.fault(&root).is_none())
             };
-            manifest.chunks = found.into_par_iter().filter(is_sound).collect();
+            manifest.chunks =
+                threads::pool(None)?.install(|| found.into_par_iter().filter(is_sound).collect());
         }
         let missing: std::collections::VecDeque<u64> =
             own.filter(|index| !manifest.chunks.contains_key(index)).collect();
         let plan = Arc::new(plan);
         let mut writer = SetWriter {
             filling: vec![Vec::new(); plan.schema.fields.len()],
-            pool: Pool::new(&plan, &root),
+            pool: Pool::new(&plan, &root)?,
             plan,
             shard,
             start,

@@ -15,6 +15,7 @@ use super::manifest::{Manifest, SEALED, remove_parts};
 use super::occupy::{
     LOCK, PATIENCE, PAUSE, busy, folders, generation, is_being_made, is_lock_name, remove_replaced, replaced,
 };
+use crate::threads;
 
 /// Largest number of faults that a message names.
 const NAMED: usize = 20;
@@ -140,13 +141,12 @@ fn whole(path: &Path, root: &Path) -> Result<Manifest, OutputError> {
 /// Refuses a set whose files are not those that were written.
 fn check(root: &Path, manifest: &Manifest, depth: Depth) -> Result<(), OutputError> {
     let sums: Vec<&Sum> = manifest.sums().collect();
-    let mut faults: Vec<String> = sums
-        .into_par_iter()
-        .filter_map(|sum| match depth {
-            Depth::Sizes => sum.size_fault(root),
-            Depth::Sums => sum.fault(root),
-        })
-        .collect();
+    let fault = |sum: &Sum| match depth {
+        Depth::Sizes => sum.size_fault(root),
+        Depth::Sums => sum.fault(root),
+    };
+    let mut faults: Vec<String> =
+        threads::pool(None)?.install(|| sums.into_par_iter().filter_map(fault).collect());
     if faults.is_empty() {
         return Ok(());
     }
