@@ -61,7 +61,9 @@ fn lamp(number: usize, wavelengths: &[f64], random: &mut Numbers) -> Vec<f64> {
                 (1.0, 587.5, 3.0),
                 (0.8, 631.0, 2.0),
             ];
-            peaks.extend(lines.map(|(height, centre, width)| (height * random.between(0.2, 1.0), centre, width)));
+            peaks.extend(
+                lines.map(|(height, centre, width)| (height * random.between(0.2, 1.0), centre, width)),
+            );
         }
     }
     let planck = |nm: f64| (560.0 / nm).powi(5) / (1.4388e7 / (nm * temperature)).exp_m1();
@@ -85,8 +87,7 @@ fn chromaticities<'a>(grid: &Grid, lights: impl Iterator<Item = &'a [f64]>) -> V
     let weights = colorimetry::emitted_xyz_weights(grid);
     lights
         .map(|light| {
-            let [x, y, z] =
-                weights.each_ref().map(|w| w.iter().zip(light).map(|(w, v)| w * v).sum::<f64>());
+            let [x, y, z] = weights.each_ref().map(|w| w.iter().zip(light).map(|(w, v)| w * v).sum::<f64>());
             [x / (x + y + z), y / (x + y + z)]
         })
         .collect()
@@ -134,7 +135,8 @@ fn averages_keep_the_chromaticity_and_the_power_of_lamps() {
 /// A table of reflectances at the wavelengths of a spectrometer, without those that water absorbs.
 fn uneven(folder: &Path) -> Vec<f64> {
     let spectrometer = (0..70).map(|i| 398.0 + 5.3 * f64::from(i) - 0.004 * f64::from(i * i));
-    let wavelengths: Vec<f64> = spectrometer.filter(|w| !(500.0..540.0).contains(w)).map(|w| (w * 1e3).round() / 1e3).collect();
+    let wavelengths: Vec<f64> =
+        spectrometer.filter(|w| !(500.0..540.0).contains(w)).map(|w| (w * 1e3).round() / 1e3).collect();
     let mut text = "nm".to_owned();
     let spectra = 25;
     (0..spectra).for_each(|i| text += &format!(",s{i}"));
@@ -142,7 +144,9 @@ fn uneven(folder: &Path) -> Vec<f64> {
         text += &format!("\n{w}");
         for i in 0..spectra {
             let i = f64::from(i);
-            let value = 0.45 + 0.2 * (0.7 * i).sin() + 0.1 * (1.3 * i).cos() * (w - 550.0) / 150.0
+            let value = 0.45
+                + 0.2 * (0.7 * i).sin()
+                + 0.1 * (1.3 * i).cos() * (w - 550.0) / 150.0
                 + 0.05 * (2.1 * i).sin() * (w / 40.0).cos();
             text += &format!(",{value:.6}");
         }
@@ -294,8 +298,12 @@ fn a_fit_says_what_it_did() {
     }
     fs::write(folder.join("lamps.csv"), text).unwrap();
     let (_, said) = succeeds(folder, "fit lamps.csv --kind illuminant -o m.json");
-    assert!(said.contains("structure finer than the grid") && said.contains("averaged over bands of 10 nm"), "{said}");
-    let (_, said) = succeeds(folder, "fit lamps.csv --kind illuminant --resample interpolate -o m.json --force");
+    assert!(
+        said.contains("structure finer than the grid") && said.contains("averaged over bands of 10 nm"),
+        "{said}"
+    );
+    let (_, said) =
+        succeeds(folder, "fit lamps.csv --kind illuminant --resample interpolate -o m.json --force");
     assert!(!said.contains("finer"), "{said}");
     let (_, said) = succeeds(folder, "fit munsell vrhel -o s.json");
     assert!(!said.contains("finer"), "{said}");

@@ -16,7 +16,7 @@ const MICROMETRES: f64 = 100.0;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Wavelengths {
     Grid(Grid),
-    /// Those of the data.
+    /// The wavelengths of the data.
     AsMeasured,
 }
 

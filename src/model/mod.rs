@@ -206,8 +206,8 @@ impl Model {
         &self.parts
     }
 
-    /// How far the basis that was given was from an orthonormal one, as the largest error of a product of two of its
-    /// vectors, where it was changed into the nearest that is one; `None` where it was taken as it was.
+    /// The largest error of a product of two vectors of the basis that was given, where that was changed into the nearest
+    /// orthonormal one; `None` where it was taken as it was.
     pub fn basis_correction(&self) -> Option<f64> {
         self.basis_correction
     }

@@ -13,10 +13,12 @@ use crate::cli::parse::grouped;
 const DRAWS: u64 = 20_000;
 
 /// Data to compare draws with.
+// A group has the name of its type, which is that of the command's as well.
 #[derive(clap::Args)]
+#[group(skip)]
 pub(super) struct Arguments {
-    /// Compare the draws with these measured spectra: files as `fit` reads them, or the
-    /// name of a built-in table
+    /// Compare the draws with these measured spectra: files as `fit` reads them, or
+    /// the name of a built-in table
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<String>,
     #[command(flatten)]

@@ -27,7 +27,7 @@ pub(in crate::cli) fn above_one(above_one: u64, draws: u64, setting: &str) -> Op
     })
 }
 
-/// What a summary says of a model that is not quite what was given, or not quite what its draws are.
+/// Sentences of a summary on a model that is not quite what was given, or not quite what its draws are.
 pub(in crate::cli) fn doubts(model: &Model) -> impl Iterator<Item = String> {
     corrected_basis(model).into_iter().chain(impossible_mean(model))
 }

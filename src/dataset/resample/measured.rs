@@ -1,4 +1,4 @@
-//! What was measured of a spectrum, and where it was not.
+//! The measured points of a spectrum, and the gaps between them.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;

@@ -134,7 +134,7 @@ pub(super) fn resample(table: &Table, grid: &Grid, settings: Resampling) -> Resu
 /// of lamps at 1 nm moves by less than 0.005 where they are interpolated at 10 nm.
 const LOST: f64 = 0.03;
 
-/// Where a table has structure finer than a grid.
+/// A place at which a table has structure finer than a grid.
 struct Fine {
     /// The number of the spectrum, from 1.
     spectrum: usize,
@@ -271,7 +271,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// What was measured of a spectrum.
+    /// The measured points of a spectrum.
     fn measured(&self, spectrum: usize) -> Result<Measured<'a>, DatasetError> {
         let table: &'a Table = self.table;
         Measured::new(spectrum + 1, table.wavelengths(), table.spectrum(spectrum))

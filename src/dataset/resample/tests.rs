@@ -72,7 +72,7 @@ fn energy_is_kept_on_uneven_grids() {
     }
 }
 
-/// What is smooth, or no finer than the grid, keeps its plain values to the last bit.
+/// Data that are smooth, or no finer than the grid, keep their plain values to the last bit.
 #[test]
 fn smooth_data_are_taken_as_they_stand() {
     for (builtin, grid) in [
