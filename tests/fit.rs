@@ -185,7 +185,10 @@ fn what_cannot_be_fitted_says_why() {
     let unnormalized = Fit::new(SpectrumKind::Illuminant).components(1).normalization(Normalization::None);
     let error = unnormalized.fit(&dark).unwrap_err();
     assert!(matches!(error, FitError::Unphysical(_)), "{error:?}");
-    assert!(error.to_string().contains("spectrum 2 of swatches") && error.to_string().contains("-3"), "{error}");
+    assert!(
+        error.to_string().contains("spectrum 2 of swatches") && error.to_string().contains("-3"),
+        "{error}"
+    );
 }
 
 #[test]

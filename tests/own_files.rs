@@ -18,7 +18,8 @@ fn model_of_draws() -> Model {
         .map(|i| recipe.draw::<f32>(Stream::new(5), i).spectrum().iter().map(|&v| f64::from(v)).collect())
         .collect();
     let table = Table::new("draws", source.grid().wavelengths().collect(), &spectra).expect("a table");
-    let data = Dataset::new(&[table], source.grid().clone(), Extrapolation::Error).expect("they are on the grid");
+    let data =
+        Dataset::new(&[table], source.grid().clone(), Extrapolation::Error).expect("they are on the grid");
     Fit::new(SpectrumKind::Reflectance).components(3).fit(&data).expect("they vary")
 }
 
@@ -81,7 +82,10 @@ fn labels_beside_draws_are_no_spectra() {
     for output in ["a.npz", "a.h5", "a.parquet", "a.zarr", "a.mat"] {
         // As many draws as bands: a label of one value a draw is as long as the wavelengths.
         let quantities = if output == "a.mat" { "spectra,lrv" } else { "spectra,lrv,weights,xyz" };
-        succeeds(folder, &format!("sample munsell-vrhel -n 31 --quantities {quantities} --engine cpu -o {output}"));
+        succeeds(
+            folder,
+            &format!("sample munsell-vrhel -n 31 --quantities {quantities} --engine cpu -o {output}"),
+        );
         let (mean, ..) = fit(folder, output, "");
         succeeds(folder, "sample munsell-vrhel -n 31 --engine cpu -o b.npz --force");
         assert_eq!(mean, fit(folder, "b.npz", "").0, "{output}");
@@ -110,9 +114,17 @@ fn refusals_name_value_place_and_remedy() {
                 print('written')";
     assert_eq!(python(folder, code), "written");
     let refusals = [
-        ("marker.csv", "spectrum 1 of \"marker.csv\": the value at 540 nm is -999", "--missing-value=-999 --missing drop"),
+        (
+            "marker.csv",
+            "spectrum 1 of \"marker.csv\": the value at 540 nm is -999",
+            "--missing-value=-999 --missing drop",
+        ),
         ("usgs.csv", "spectrum 8 of \"usgs.csv\": the value at 540 nm is -1", "--missing drop"),
-        ("percent.csv", "spectrum 3 of percent.csv (40 spectra): most of its values are above 1", "--scale 0.01"),
+        (
+            "percent.csv",
+            "spectrum 3 of percent.csv (40 spectra): most of its values are above 1",
+            "--scale 0.01",
+        ),
         ("nan.csv", "spectrum 6 of \"nan.csv\": the value at 430 nm is missing", "--missing drop"),
         ("um.csv", "runs from 0.4 to 0.7", "--unit um"),
         ("index.csv", "counts from 1 to 31", "--layout"),
@@ -135,7 +147,9 @@ fn refusals_name_value_place_and_remedy() {
     assert!(count("nan.csv", "--missing drop").contains("(39 spectra)"));
     assert!(count("um.csv", "--unit um").contains("(40 spectra)"));
     assert!(count("zero.csv", "--wavelengths 430:10:700").contains("(40 spectra)"));
-    assert!(count("commas.csv", "--decimal point --scale 0.1 --wavelengths 400:10:420").contains("(3 spectra)"));
+    assert!(
+        count("commas.csv", "--decimal point --scale 0.1 --wavelengths 400:10:420").contains("(3 spectra)")
+    );
     let ok = count("ok.csv", "");
     assert_eq!(ok.replace("ok.csv", "x"), count("ok.csv", "--layout columns").replace("ok.csv", "x"));
 }
@@ -162,7 +176,10 @@ fn look_says_how_a_file_is_read() {
         "other (3 x 4)",
         "nothing is wrong with them",
     ] {
-        assert!(text.split_whitespace().collect::<Vec<_>>().join(" ").contains(part), "no {part:?} in {text}");
+        assert!(
+            text.split_whitespace().collect::<Vec<_>>().join(" ").contains(part),
+            "no {part:?} in {text}"
+        );
     }
     let (json, _) = succeeds(folder, "look b.mat --json -o b.svg");
     let facts: Value = serde_json::from_str(&json).expect("it is JSON");

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use spectroll::output::write_file;
 use spectroll::{
-    Dataset, Extrapolation, Fit, Grid, Missing, Model, Normalization, ResampleMethod, Resampling, SpectraCounts,
-    SpectrumKind, Table,
+    Dataset, Extrapolation, Fit, Grid, Missing, Model, Normalization, ResampleMethod, Resampling,
+    SpectraCounts, SpectrumKind, Table,
 };
 
 use super::exit::Usage;

@@ -80,7 +80,11 @@ const SOUND: &str = "nothing is wrong with them";
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
     if arguments.output.is_some() && arguments.files.len() > 1 {
-        return Err(Usage(format!("-o draws one file, and there are {}: look at them one by one", arguments.files.len())).into());
+        return Err(Usage(format!(
+            "-o draws one file, and there are {}: look at them one by one",
+            arguments.files.len()
+        ))
+        .into());
     }
     let grid = arguments.wavelengths.clone().unwrap_or(Grid::DEFAULT);
     let mut all = Vec::new();
@@ -142,7 +146,10 @@ fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: &Grid) -> F
                 let mut said = data.notes().to_vec();
                 for (count, values) in [(counts.above_one, "above 1"), (counts.below_zero, "below 0")] {
                     if count > 0 {
-                        said.push(format!("{} with values {values}", counted(count as u64, "spectrum", "spectra")));
+                        said.push(format!(
+                            "{} with values {values}",
+                            counted(count as u64, "spectrum", "spectra")
+                        ));
                     }
                 }
                 Ok(if said.is_empty() { SOUND.to_owned() } else { said.join(", ") })
@@ -180,7 +187,8 @@ fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: &Grid) -> F
 /// How a file was read, in a line that fits above a picture.
 fn note(facts: &Facts) -> String {
     let layout = facts.layout.split(": ").next().unwrap_or_default();
-    let note = format!("{}; {layout}; {} to {} nm", facts.format, short(facts.first_nm), short(facts.last_nm));
+    let note =
+        format!("{}; {layout}; {} to {} nm", facts.format, short(facts.first_nm), short(facts.last_nm));
     note.chars().take(100).collect()
 }
 
@@ -212,9 +220,11 @@ fn text(facts: &Facts) -> String {
         ),
     };
     line(&mut text, "missing", &missing);
-    let values = format!("{} to {}, {} on average", short(facts.smallest), short(facts.largest), short(facts.mean));
+    let values =
+        format!("{} to {}, {} on average", short(facts.smallest), short(facts.largest), short(facts.mean));
     line(&mut text, "values", &values);
-    let kind = facts.kind.map_or("not told by the file: pass --kind to fit".to_owned(), |kind| format!("{kind}s"));
+    let kind =
+        facts.kind.map_or("not told by the file: pass --kind to fit".to_owned(), |kind| format!("{kind}s"));
     line(&mut text, "kind", &kind);
     for (index, note) in facts.notes.iter().enumerate() {
         line(&mut text, if index == 0 { "notes" } else { "" }, note);
@@ -222,7 +232,8 @@ fn text(facts: &Facts) -> String {
     if !facts.others.is_empty() {
         line(&mut text, "also there", &facts.others.join(", "));
     }
-    for (label, verdict) in [("reflectances", &facts.as_reflectances), ("illuminants", &facts.as_illuminants)] {
+    for (label, verdict) in [("reflectances", &facts.as_reflectances), ("illuminants", &facts.as_illuminants)]
+    {
         if let Some(verdict) = verdict {
             line(&mut text, label, verdict);
         }

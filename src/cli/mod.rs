@@ -110,7 +110,9 @@ pub(crate) fn main() -> ExitCode {
             // Our messages hold their causes.
             match exit::data_remedy(&error) {
                 Some(options) if looks => tell!("error: {error}{options}"),
-                Some(options) => tell!("error: {error}{options}; `spectroll look FILE` shows how a file is read"),
+                Some(options) => {
+                    tell!("error: {error}{options}; `spectroll look FILE` shows how a file is read")
+                }
                 None => tell!("error: {error}{}", exit::remedy(&error)),
             }
             ExitCode::from(exit::code(&error))

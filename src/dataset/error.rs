@@ -51,7 +51,9 @@ pub enum DatasetError {
     Place { path: PathBuf, place: String, reason: String, remedy: Remedy },
     #[error("{path:?}: {reason}")]
     Layout { path: PathBuf, reason: String, remedy: Remedy },
-    #[error("{path:?} does not say at which wavelengths its {bands} bands are: give them, as start:step:stop")]
+    #[error(
+        "{path:?} does not say at which wavelengths its {bands} bands are: give them, as start:step:stop"
+    )]
     NoWavelengths { path: PathBuf, bands: usize },
     #[error(
         "{path:?} holds no matrix of spectra with its wavelengths beside it (X with S_X = [start step count], or a vector wavelength); it holds {found}"
@@ -108,7 +110,9 @@ impl DatasetError {
             | DatasetError::Spectrum { remedy, .. } => *remedy,
             DatasetError::NoWavelengths { .. } => Remedy::MeasuredAt,
             DatasetError::NotMeasured { .. } => Remedy::Missing,
-            DatasetError::AllDropped { .. } | DatasetError::Grids { .. } | DatasetError::Range { .. } => Remedy::Wavelengths,
+            DatasetError::AllDropped { .. } | DatasetError::Grids { .. } | DatasetError::Range { .. } => {
+                Remedy::Wavelengths
+            }
             _ => Remedy::None,
         }
     }

@@ -66,7 +66,8 @@ fn hdf5_bytes(path: &std::path::Path, bytes: Vec<u8>) -> Result<arrays::Arrays, 
 
 #[cfg(not(feature = "hdf5"))]
 fn hdf5_bytes(path: &std::path::Path, _: Vec<u8>) -> Result<arrays::Arrays, DatasetError> {
-    let reason = "this build leaves out HDF5: build it with the feature hdf5, or resave with save(file, '-v7')";
+    let reason =
+        "this build leaves out HDF5: build it with the feature hdf5, or resave with save(file, '-v7')";
     Err(format::not_built(path, "HDF5", reason))
 }
 

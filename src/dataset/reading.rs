@@ -1,7 +1,7 @@
 //! Settings of a reader, and its account of how it read a file.
 
-use super::{BuiltinTable, Table};
 use super::units::WavelengthUnit;
+use super::{BuiltinTable, Table};
 
 /// Settings of a reader, for what a file does not say of itself or says wrongly.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -307,7 +307,8 @@ mod tests {
                 Dataset::new(&[table], Grid::new(400.0, 10.0, 4).unwrap(), Extrapolation::Error).unwrap();
             let fit =
                 Fit::new(SpectrumKind::Reflectance).components(2).normalization(normalization).fit(&data);
-            let expected = matches!(fit, Err(FitError::Scale | FitError::Power { .. } | FitError::Unphysical(_)));
+            let expected =
+                matches!(fit, Err(FitError::Scale | FitError::Power { .. } | FitError::Unphysical(_)));
             assert!(expected, "{size:e}: {fit:?}");
         }
     }

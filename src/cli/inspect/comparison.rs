@@ -35,7 +35,10 @@ impl Arguments {
     pub(super) fn compare(&self, recipe: &Recipe, seed: u64) -> anyhow::Result<Option<Compared>> {
         if !self.is_asked() {
             if self.reading.is_asked() {
-                return Err(Usage("the options of reading files need some: name them with --data".to_owned()).into());
+                return Err(Usage(
+                    "the options of reading files need some: name them with --data".to_owned(),
+                )
+                .into());
             }
             return Ok(None);
         }

@@ -58,14 +58,18 @@ impl<'a> Source<'a> {
             return Source { path: name, array: None, wavelengths: None };
         }
         let (rest, wavelengths) = match name.rsplit_once('@') {
-            Some((rest, wavelengths)) if !wavelengths.is_empty() && !rest.is_empty() => (rest, Some(wavelengths)),
+            Some((rest, wavelengths)) if !wavelengths.is_empty() && !rest.is_empty() => {
+                (rest, Some(wavelengths))
+            }
             _ => (name, None),
         };
         if exists(rest) {
             return Source { path: rest, array: None, wavelengths };
         }
         match rest.rsplit_once(':') {
-            Some((path, array)) if !path.is_empty() && !array.is_empty() => Source { path, array: Some(array), wavelengths },
+            Some((path, array)) if !path.is_empty() && !array.is_empty() => {
+                Source { path, array: Some(array), wavelengths }
+            }
             _ => Source { path: rest, array: None, wavelengths },
         }
     }
@@ -98,7 +102,11 @@ impl DataArguments {
     }
 
     /// The table of a name, scaled, and notes on what was done to it.
-    pub(in crate::cli) fn table(&self, name: &str, grid: Option<&Grid>) -> anyhow::Result<(Table, Vec<String>)> {
+    pub(in crate::cli) fn table(
+        &self,
+        name: &str,
+        grid: Option<&Grid>,
+    ) -> anyhow::Result<(Table, Vec<String>)> {
         if let Some(builtin) = BuiltinTable::named(name) {
             return Ok((builtin.table().scaled(self.scale), Vec::new()));
         }
