@@ -256,7 +256,10 @@ fn candidates<'a>(
     }
     // Vectors beside matrices are means, errors and labels.
     if options.array.is_none() && found.iter().any(|(array, _)| !array.is_vector()) {
-        found.retain(|(array, _)| !array.is_vector());
+        found.retain(|(array, wave)| {
+            let is_sampled = matches!(&wave.source, Source::Sampling(suffix) if !suffix.is_empty());
+            !array.is_vector() || is_sampled
+        });
     }
     // One matrix may have two names.
     let mut distinct: Vec<(&Array, Wave)> = Vec::new();

@@ -105,7 +105,10 @@ impl Fit {
         }
         let (mut centred, powers) = self.normalization.divide(data)?;
         let mean = centred.mean();
-        if self.kind == SpectrumKind::Reflectance && mean.is_finite() && mean > 1.0 {
+        // Where only some are, they are named.
+        let percents = centred.column_iter().filter(|spectrum| spectrum.mean() > 1.0).count();
+        let are_percents = 2 * percents > centred.ncols();
+        if self.kind == SpectrumKind::Reflectance && are_percents && mean.is_finite() && mean > 1.0 {
             return Err(FitError::NotReflectances { mean });
         }
         if centred.iter().all(|v| v.is_finite()) {
