@@ -48,7 +48,7 @@ fn averages_are_sums_by_triangular_weights() {
     let auto = on(&table, "400:10:700", Resampling::default()).unwrap();
     assert_eq!(auto.spectra, averaged.spectra);
     assert!(
-        auto.notes[0].contains("structure finer than the grid, as at 546 nm in spectrum 1"),
+        auto.notes[0].contains("structure finer than the grid, as at 434 nm in spectrum 1"),
         "{:?}",
         auto.notes
     );
