@@ -157,7 +157,7 @@ impl Model {
         let mut explained = 0.0;
         for &share in &parts.explained_variance {
             explained += share;
-            if share < 0.0 || explained > 1.0 + 1e-9 {
+            if share < 0.0 || explained > 1.0 + 1e-5 {
                 return Err(ModelError::ExplainedVariance(share));
             }
         }
