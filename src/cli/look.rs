@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     data: DataArguments,
 }
 
-/// How a file was read, for programs.
+/// Account of how a file was read, for programs.
 #[derive(Serialize)]
 struct Facts {
     file: String,
@@ -184,7 +184,7 @@ fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: &Grid) -> F
     }
 }
 
-/// How a file was read, in a line that fits above a picture.
+/// Account of how a file was read, in a line that fits above a picture.
 fn note(facts: &Facts) -> String {
     let layout = facts.layout.split(": ").next().unwrap_or_default();
     let note =

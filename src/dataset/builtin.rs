@@ -189,7 +189,8 @@ mod tests {
             let values = || (0..table.len()).map(|spectrum| table.spectrum(spectrum));
             if table.kind().is_some() {
                 let is_fraction = |&value: &f64| (0.0..=1.0).contains(&value);
-                let is_right = |value: &f64| table.kind() == Some(SpectrumKind::Illuminant) || is_fraction(value);
+                let is_right =
+                    |value: &f64| table.kind() == Some(SpectrumKind::Illuminant) || is_fraction(value);
                 assert!(values().flatten().all(is_right), "{}", table.name());
                 assert!((0..table.wavelengths().len()).all(|band| values().any(|s| s[band] > 0.0)));
             }
