@@ -87,9 +87,9 @@ impl Separator {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Decimal {
-    /// 0.5
+    /// A point, as in 0.5.
     Point,
-    /// 0,5
+    /// A comma, as in 0,5.
     Comma,
 }
 
