@@ -69,7 +69,7 @@ struct Facts {
     kind: Option<SpectrumKind>,
     notes: Vec<String>,
     others: Vec<String>,
-    /// What `fit` would say of the spectra as reflectances and as illuminants.
+    /// Verdicts of `fit` on the spectra as reflectances and as illuminants.
     as_reflectances: Option<String>,
     as_illuminants: Option<String>,
 }

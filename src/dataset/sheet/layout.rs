@@ -62,7 +62,7 @@ impl Axis {
 pub(super) struct Extent {
     /// Cells of most rows that hold numbers.
     pub(super) cells: usize,
-    /// The same without columns at the end that are empty throughout.
+    /// Cells of most rows without columns at the end that are empty throughout.
     pub(super) width: usize,
 }
 

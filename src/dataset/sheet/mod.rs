@@ -229,7 +229,7 @@ impl Sheet {
         self.rows.len()
     }
 
-    /// Whether the cells, all whole numbers, can be the halves of numbers with decimal commas; none where a heading has as
+    /// Two readings of cells that are all whole numbers, where they can be the halves of numbers with decimal commas; none where a heading has as
     /// many cells.
     pub(super) fn comma_doubt(&self) -> Option<CommaDoubt> {
         let is_data = |row: &usize| {
