@@ -130,7 +130,7 @@ fn refusals_name_value_place_and_remedy() {
             "spectrum 3 of percent.csv (40 spectra): most of its values are above 1",
             "--scale 0.01",
         ),
-        ("nan.csv", "spectrum 6 of \"nan.csv\": the value at 430 nm is missing", "--missing drop"),
+        ("nan.csv", "spectrum 6 of \"nan.csv\" has no value at 430 nm", "--missing drop"),
         ("um.csv", "runs from 0.4 to 0.7", "--unit um"),
         ("index.csv", "counts from 1 to 31", "--layout"),
         ("zero.csv", "every spectrum is 0 at 3 wavelengths from 400 to 420 nm", "--wavelengths"),
