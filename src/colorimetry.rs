@@ -7,45 +7,56 @@ use crate::dataset::BuiltinTable;
 use crate::grid::{Extrapolation, Grid, Spline};
 
 /// The CIE standard illuminant D65 on a grid (relative power, 100 at 560 nm); zero outside 380 to 780 nm.
-pub fn d65(grid: Grid) -> Vec<f64> {
+pub fn d65(grid: &Grid) -> Vec<f64> {
     on_grid(BuiltinTable::D65, 0, grid)
 }
 
 /// The CIE 1931 2 degree observer's colour matching functions x, y and z on a grid; zero outside 360 to 830 nm.
-pub fn cmf(grid: Grid) -> [Vec<f64>; 3] {
+pub fn cmf(grid: &Grid) -> [Vec<f64>; 3] {
     [0, 1, 2].map(|function| on_grid(BuiltinTable::Xyz1931, function, grid))
 }
 
 /// The CIE standard illuminant A on a grid (relative power, 100 at 560 nm): a black body of 2848 K in the temperature
 /// scale of 1931 (CIE 15:2004, eq. 3.1).
-pub fn illuminant_a(grid: Grid) -> Vec<f64> {
+pub fn illuminant_a(grid: &Grid) -> Vec<f64> {
     let planck = |nm: f64| nm.powi(-5) / (1.435e7 / (2848.0 * nm)).exp_m1();
     grid.wavelengths().map(|w| 100.0 * planck(w) / planck(560.0)).collect()
 }
 
-fn on_grid(table: BuiltinTable, spectrum: usize, grid: Grid) -> Vec<f64> {
+fn on_grid(table: BuiltinTable, spectrum: usize, grid: &Grid) -> Vec<f64> {
     let table = table.table();
     let spline = Spline::new(table.wavelengths(), table.spectrum(spectrum));
     grid.wavelengths().map(|w| spline.at(w, Extrapolation::Zero)).collect()
 }
 
+/// Weights of X, Y and Z for the power of a light in each band, per nm: its tristimulus values are sums of the products,
+/// times the step of the grid or, on an uneven one, the widths of the trapezoid rule.
+pub fn emitted_xyz_weights(grid: &Grid) -> [Vec<f64>; 3] {
+    let widths = grid.widths();
+    cmf(grid).map(|f| f.iter().zip(&widths).map(|(f, width)| f * width).collect())
+}
+
 /// Weights of X, Y and Z for reflectances under D65 (1931 2 degree observer): tristimulus values are their products
 /// with a reflectance, and a perfect white has Y = 1. `None` where the grid has no visible light.
-pub fn xyz_weights(grid: Grid) -> Option<[Vec<f64>; 3]> {
+pub fn xyz_weights(grid: &Grid) -> Option<[Vec<f64>; 3]> {
     xyz_weights_under(&d65(grid), grid)
 }
 
 /// Weights of X, Y and Z for reflectances under `light`, the power of an illuminant in each band, in any unit: a
 /// perfect white has Y = 1. `None` where none of its light is visible.
-pub fn xyz_weights_under(light: &[f64], grid: Grid) -> Option<[Vec<f64>; 3]> {
+pub fn xyz_weights_under(light: &[f64], grid: &Grid) -> Option<[Vec<f64>; 3]> {
     let cmf = cmf(grid);
+    // Widths relative to the first are 1 on an even grid, so that its weights are those of a plain sum to the last bit.
+    let widths = grid.widths();
+    let light: Vec<f64> = light.iter().zip(&widths).map(|(e, width)| e * (width / widths[0])).collect();
     let white: f64 = light.iter().zip(&cmf[1]).map(|(e, y)| e * y).sum();
     (white > 0.0).then(|| cmf.map(|f| light.iter().zip(&f).map(|(e, f)| e * f / white).collect()))
 }
 
 /// Weights of the luminous reflectance, LRV(r) = sum r D65 y / sum D65 y: CIE Y of the 1931 2 degree observer under
-/// D65. They sum to 1, so a perfect white has LRV 1. `None` where the grid has no visible light.
-pub fn lrv_weights(grid: Grid) -> Option<Vec<f64>> {
+/// D65. They sum to 1, so a perfect white has LRV 1. `None` where the grid has no visible light. On an uneven grid the
+/// sums are integrals by the trapezoid rule, as all that is weighted here.
+pub fn lrv_weights(grid: &Grid) -> Option<Vec<f64>> {
     xyz_weights(grid).map(|[_, y, _]| y)
 }
 
@@ -84,7 +95,7 @@ mod tests {
     #[test]
     fn a_perfect_white_has_lrv_1_and_the_chromaticity_of_d65() {
         for grid in ["400:10:700", "400:5:700", "380:1:780"] {
-            let grid = grid.parse().unwrap();
+            let grid = &grid.parse().unwrap();
             let [x, y, z] = xyz_weights(grid).unwrap().map(|w| w.iter().sum::<f64>());
             assert!((y - 1.0).abs() < 1e-14);
             let (cx, cy) = (x / (x + y + z), y / (x + y + z));
@@ -102,14 +113,14 @@ mod tests {
                 assert!((a - b).abs() <= error * b.abs(), "{found:?} {published:?}");
             }
         };
-        let grid = "400:50:700".parse().unwrap();
+        let grid = &"400:50:700".parse().unwrap();
         let [x, y, z] = cmf(grid);
         close(&x, &[0.01431, 0.3362, 0.0049, 0.4334499, 1.0622, 0.2835, 0.011359], 2e-3);
         close(&y, &[0.000396, 0.038, 0.323, 0.9949501, 0.631, 0.107, 0.004102], 2e-3);
         close(&z[..5], &[0.06785001, 1.77211, 0.272, 0.008749999, 0.0008], 2e-3);
         close(&d65(grid), &[82.7549, 117.008, 109.354, 104.046, 90.0062, 80.0268, 71.6091], 1e-4);
         close(&illuminant_a(grid), &[14.708, 33.0859, 59.8611, 92.912, 129.043, 165.028, 198.261], 1e-5);
-        let fine: Grid = "380:1:780".parse().unwrap();
+        let fine: &Grid = &"380:1:780".parse().unwrap();
         let chromaticity = |light: &[f64]| {
             let [x, y, z] = cmf(fine).map(|f| f.iter().zip(light).map(|(f, e)| f * e).sum::<f64>());
             [x / (x + y + z), y / (x + y + z)]
@@ -132,6 +143,6 @@ mod tests {
 
     #[test]
     fn a_grid_in_the_infrared_has_no_luminance() {
-        assert_eq!(lrv_weights("900:10:1000".parse().unwrap()), None);
+        assert_eq!(lrv_weights(&"900:10:1000".parse().unwrap()), None);
     }
 }

@@ -44,8 +44,8 @@ pub mod export;
 pub mod evaluation;
 
 pub use dataset::{
-    BuiltinTable, Dataset, DatasetError, Decimal, ReadOptions, Reading, Remedy, Separator, SpectraCounts,
-    SpectrumKind, Table, TableLayout, Unphysical, WavelengthUnit,
+    BuiltinTable, Dataset, DatasetError, Decimal, Missing, ReadOptions, Reading, Remedy, ResampleMethod,
+    Resampling, Separator, SpectraCounts, SpectrumKind, Table, TableLayout, Unphysical, WavelengthUnit,
 };
 pub use draw_status::DrawStatus;
 pub use engine::{

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Where a shell puts what it opened itself, as for `<(...)`: pipes there have a writer.
+/// Places where a shell puts what it opened itself, as for `<(...)`: pipes there have a writer.
 const OPENED: [&str; 3] = ["/dev/stdin", "/dev/fd/", "/proc/self/fd/"];
 
 /// Reads a file of no more than `limit` bytes.

@@ -44,7 +44,7 @@ fn extremes() -> Vec<(String, Recipe, f64)> {
 #[test]
 fn extremes_are_covered_and_physical_and_the_same_on_every_engine() {
     let software = gpu_is_software();
-    let weights = colorimetry::lrv_weights("400:10:700".parse().expect("a grid")).expect("it is visible");
+    let weights = colorimetry::lrv_weights(&"400:10:700".parse().expect("a grid")).expect("it is visible");
     for (name, recipe, probability) in extremes() {
         assert_eq!(recipe.proposal(), ProposalKind::Cover, "{name}");
         // Six standard errors of 65,536 candidates, and the last digit of those known to three.

@@ -118,7 +118,7 @@ fn the_committed_daylights_are_what_the_measurements_give() {
         let committed = Model::builtin(&format!("granada{suffix}")).expect("it is built in");
         let refitted = fit_granada(&path, grid);
         let (a, b) = (committed.parts(), refitted.parts());
-        assert_eq!((a.kind, a.grid, a.normalization), (b.kind, b.grid, b.normalization));
+        assert_eq!((a.kind, &a.grid, a.normalization), (b.kind, &b.grid, b.normalization));
         let mut errors = vec![(&a.mean - &b.mean).amax(), (&a.weight_mean - &b.weight_mean).amax()];
         errors.extend([(&a.basis - &b.basis).amax(), (&a.weight_covariance - &b.weight_covariance).amax()]);
         errors.extend(a.explained_variance.iter().zip(&b.explained_variance).map(|(a, b)| (a - b).abs()));
@@ -152,6 +152,13 @@ fn what_cannot_be_fitted_says_why() {
         infinite.to_string(),
         "spectrum 2 of swatches: the value at 410 nm is inf; every value must be finite, or missing"
     );
+    let nan = Table::new("swatches", vec![400.0, 410.0], &[vec![0.1, 0.2], vec![0.3, f64::NAN]]).unwrap();
+    let nan = Dataset::new(&[nan], "400:10:410".parse().unwrap(), Extrapolation::Error).unwrap_err();
+    assert_eq!(
+        nan.to_string(),
+        "spectrum 2 of swatches has no value at 410 nm, which the grid needs; its last is at 400 nm: choose a grid \
+         without it, leave such spectra out"
+    );
 
     let line = |a: f64| vec![0.5, 0.5 + a, 0.5 - a, 0.5];
     let plane =
@@ -178,7 +185,10 @@ fn what_cannot_be_fitted_says_why() {
     let unnormalized = Fit::new(SpectrumKind::Illuminant).components(1).normalization(Normalization::None);
     let error = unnormalized.fit(&dark).unwrap_err();
     assert!(matches!(error, FitError::Unphysical(_)), "{error:?}");
-    assert!(error.to_string().contains("spectrum 2 of swatches") && error.to_string().contains("-3"), "{error}");
+    assert!(
+        error.to_string().contains("spectrum 2 of swatches") && error.to_string().contains("-3"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -208,12 +218,13 @@ fn what_is_not_a_model_says_why() {
         ("schema", json!(2), "a model of schema 2, and this program reads up to 1: update spectroll"),
         ("kind", json!("sound"), "unknown variant `sound`"),
         ("wavelengths", json!([420.0, 410.0, 400.0]), "number 2 is 410 nm after 420 nm"),
-        ("wavelengths", json!([400.0, 410.0, 425.0]), "not evenly spaced"),
+        ("wavelengths", json!([400.0, 410.0, 410.0]), "number 3 is 410 nm after 410 nm"),
         ("wavelengths", json!([400.0, 410.0]), "basis has 3 values where the rest of the model needs 2"),
         ("mean", json!([0.5, 0.5]), "mean has 2 values where the rest of the model needs 3"),
         ("basis", json!([[0.6, 0.8], [-0.8, 0.6]]), "basis has 2 values where the rest of the model needs 3"),
         ("basis", json!([[0.6, 0.8, 0.0], [0.6, 0.8, 0.0]]), "basis vectors 2 and 1 have the product 1"),
         ("basis", json!([[1.2, 1.6, 0.0], [-0.8, 0.6, 0.0]]), "basis vectors 1 and 1 have the product 4"),
+        ("basis", json!([[0.6, 0.8, 0.0], [-0.8, 0.6001, 0.0]]), "basis vectors 2 and 1 have the product"),
         ("basis", json!([]), "this one has 0 for 3 bands"),
         ("weight_mean", json!([0.0]), "weight_mean has 1 values where the rest of the model needs 2"),
         (
@@ -240,6 +251,32 @@ fn what_is_not_a_model_says_why() {
     }
     let error = Model::load(Path::new("no such model.json")).unwrap_err().to_string();
     assert!(error.contains("no such model.json"), "{error}");
+}
+
+/// Principal components in single precision are made orthonormal, and the spectra stay what they were to that precision.
+#[test]
+fn a_basis_in_single_precision_is_made_orthonormal() {
+    let exact = Model::builtin("munsell-vrhel").expect("it is built in");
+    assert_eq!(exact.basis_correction(), None);
+    let mut single: Value = serde_json::from_str(&exact.to_json()).expect("a model is JSON");
+    let mut random = 1u32;
+    for value in
+        single["basis"].as_array_mut().expect("rows").iter_mut().flat_map(|row| row.as_array_mut().unwrap())
+    {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let error = 1.0 + 2e-6 * (f64::from(random) / f64::from(u32::MAX) - 0.5);
+        *value = json!(f64::from((value.as_f64().expect("a number") * error) as f32));
+    }
+    let model = Model::from_json("single.json", &single.to_string()).expect("it is nearly orthonormal");
+    let error = model.basis_correction().expect("it was corrected");
+    assert!(error > 1e-9 && error < 1e-5, "{error}");
+    let basis = &model.parts().basis;
+    let products = basis * basis.transpose() - DMatrix::identity(6, 6);
+    assert!(products.amax() < 1e-14, "{}", products.amax());
+    assert!((basis - &exact.parts().basis).amax() < 2e-6);
+    // What it writes is orthonormal.
+    let again = Model::from_json("again.json", &model.to_json()).expect("it was just written");
+    assert_eq!((again.parts(), again.basis_correction()), (model.parts(), None));
 }
 
 /// Fits this many small data sets with the program; see `fit_small.py`.

@@ -183,7 +183,10 @@ fn other_versions_say_what_they_are() {
     let table = open(&[v4("sur_x", 3, &SPECTRA), v4("S_x", 1, &GRID)].concat(), None).unwrap();
     assert_eq!((table.len(), table.spectrum(1)), (2, &SPECTRA[3..]));
     // Text under the name of a MATLAB file is read as text.
-    assert!(message(b"not at all a MATLAB file, but long enough to look at", None).contains("no table of numbers"));
+    assert!(
+        message(b"not at all a MATLAB file, but long enough to look at", None)
+            .contains("no table of numbers")
+    );
     assert!(message(b"", None).contains("is empty"));
 }
 

@@ -18,7 +18,8 @@ fn model_of_draws() -> Model {
         .map(|i| recipe.draw::<f32>(Stream::new(5), i).spectrum().iter().map(|&v| f64::from(v)).collect())
         .collect();
     let table = Table::new("draws", source.grid().wavelengths().collect(), &spectra).expect("a table");
-    let data = Dataset::new(&[table], source.grid(), Extrapolation::Error).expect("they are on the grid");
+    let data =
+        Dataset::new(&[table], source.grid().clone(), Extrapolation::Error).expect("they are on the grid");
     Fit::new(SpectrumKind::Reflectance).components(3).fit(&data).expect("they vary")
 }
 
@@ -69,6 +70,11 @@ fn every_format_gives_the_model_of_the_draws() {
     let first = fit(folder, "a.npy@400:10:700", kind);
     for (output, _, options) in formats.iter().filter(|(output, ..)| !output.starts_with('a')) {
         let found = fit(folder, output, options);
+        // Nine digits tell every float32 from every other, and are not its every digit.
+        if *output == "j/" {
+            assert!(found.0.iter().zip(&first.0).all(|(a, b)| (a - b).abs() < 1e-8), "{output}");
+            continue;
+        }
         assert_eq!((&found.0, &found.1), (&first.0, &first.1), "{output}");
     }
 }
@@ -81,7 +87,10 @@ fn labels_beside_draws_are_no_spectra() {
     for output in ["a.npz", "a.h5", "a.parquet", "a.zarr", "a.mat"] {
         // As many draws as bands: a label of one value a draw is as long as the wavelengths.
         let quantities = if output == "a.mat" { "spectra,lrv" } else { "spectra,lrv,weights,xyz" };
-        succeeds(folder, &format!("sample munsell-vrhel -n 31 --quantities {quantities} --engine cpu -o {output}"));
+        succeeds(
+            folder,
+            &format!("sample munsell-vrhel -n 31 --quantities {quantities} --engine cpu -o {output}"),
+        );
         let (mean, ..) = fit(folder, output, "");
         succeeds(folder, "sample munsell-vrhel -n 31 --engine cpu -o b.npz --force");
         assert_eq!(mean, fit(folder, "b.npz", "").0, "{output}");
@@ -110,10 +119,18 @@ fn refusals_name_value_place_and_remedy() {
                 print('written')";
     assert_eq!(python(folder, code), "written");
     let refusals = [
-        ("marker.csv", "spectrum 1 of \"marker.csv\": the value at 540 nm is -999", "--missing-value=-999 --missing drop"),
+        (
+            "marker.csv",
+            "spectrum 1 of \"marker.csv\": the value at 540 nm is -999",
+            "--missing-value=-999 --missing drop",
+        ),
         ("usgs.csv", "spectrum 8 of \"usgs.csv\": the value at 540 nm is -1", "--missing drop"),
-        ("percent.csv", "spectrum 3 of percent.csv (40 spectra): most of its values are above 1", "--scale 0.01"),
-        ("nan.csv", "spectrum 6 of \"nan.csv\": the value at 430 nm is missing", "--missing drop"),
+        (
+            "percent.csv",
+            "spectrum 3 of percent.csv (40 spectra): most of its values are above 1",
+            "--scale 0.01",
+        ),
+        ("nan.csv", "spectrum 6 of \"nan.csv\" has no value at 430 nm", "--missing drop"),
         ("um.csv", "runs from 0.4 to 0.7", "--unit um"),
         ("index.csv", "counts from 1 to 31", "--layout"),
         ("zero.csv", "every spectrum is 0 at 3 wavelengths from 400 to 420 nm", "--wavelengths"),
@@ -135,7 +152,9 @@ fn refusals_name_value_place_and_remedy() {
     assert!(count("nan.csv", "--missing drop").contains("(39 spectra)"));
     assert!(count("um.csv", "--unit um").contains("(40 spectra)"));
     assert!(count("zero.csv", "--wavelengths 430:10:700").contains("(40 spectra)"));
-    assert!(count("commas.csv", "--decimal point --scale 0.1 --wavelengths 400:10:420").contains("(3 spectra)"));
+    assert!(
+        count("commas.csv", "--decimal point --scale 0.1 --wavelengths 400:10:420").contains("(3 spectra)")
+    );
     let ok = count("ok.csv", "");
     assert_eq!(ok.replace("ok.csv", "x"), count("ok.csv", "--layout columns").replace("ok.csv", "x"));
 }
@@ -162,7 +181,10 @@ fn look_says_how_a_file_is_read() {
         "other (3 x 4)",
         "nothing is wrong with them",
     ] {
-        assert!(text.split_whitespace().collect::<Vec<_>>().join(" ").contains(part), "no {part:?} in {text}");
+        assert!(
+            text.split_whitespace().collect::<Vec<_>>().join(" ").contains(part),
+            "no {part:?} in {text}"
+        );
     }
     let (json, _) = succeeds(folder, "look b.mat --json -o b.svg");
     let facts: Value = serde_json::from_str(&json).expect("it is JSON");

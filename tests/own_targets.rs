@@ -73,7 +73,7 @@ fn labels_are_uniform_with_generators_of_rand() {
 
 #[test]
 fn every_spectrum_has_the_lrv_of_its_label() {
-    let weights = colorimetry::lrv_weights("400:10:700".parse().expect("a grid")).expect("it is visible");
+    let weights = colorimetry::lrv_weights(&"400:10:700".parse().expect("a grid")).expect("it is visible");
     for bounds in ALL_BOUNDS {
         for draw in draws(&recipe(bounds), Stream::new(52)) {
             let found: f64 = weights.iter().zip(draw.spectrum()).map(|(w, &s)| w * f64::from(s)).sum();

@@ -189,7 +189,7 @@ fn values_are_those_of_f64() {
         let grid = recipe.model().grid();
         let under_a = name.ends_with('A').then(|| colorimetry::illuminant_a(grid));
         let xyz_weights = match name.contains("lights") {
-            true => colorimetry::cmf(grid).map(|f| f.iter().map(|v| v * grid.step()).collect()),
+            true => colorimetry::cmf(grid).map(|f| f.iter().map(|v| v * grid.widths()[0]).collect()),
             false => {
                 let light = under_a.unwrap_or_else(|| colorimetry::d65(grid));
                 colorimetry::xyz_weights_under(&light, grid).expect("the grid is visible")

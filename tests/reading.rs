@@ -23,7 +23,8 @@ struct Case {
 fn cases(folder: &Path) -> Vec<Case> {
     let python = std::env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reading.py");
-    let output = Command::new(python).arg(script).arg(folder).output().expect("SPECTROLL_PYTHON names a Python");
+    let output =
+        Command::new(python).arg(script).arg(folder).output().expect("SPECTROLL_PYTHON names a Python");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     print!("{}", String::from_utf8_lossy(&output.stderr));
     let text = std::fs::read_to_string(folder.join("cases.json")).expect("the script writes it");
@@ -32,7 +33,8 @@ fn cases(folder: &Path) -> Vec<Case> {
 
 /// Reads FILE:ARRAY@WAVELENGTHS.
 fn read(folder: &Path, case: &Case) -> Result<Reading, DatasetError> {
-    let (rest, wavelengths) = case.name.split_once('@').map_or((case.name.as_str(), None), |(a, b)| (a, Some(b)));
+    let (rest, wavelengths) =
+        case.name.split_once('@').map_or((case.name.as_str(), None), |(a, b)| (a, Some(b)));
     let (file, array) = rest.split_once(':').map_or((rest, None), |(a, b)| (a, Some(b)));
     let grid = wavelengths.and_then(|text| text.parse::<Grid>().ok());
     let options = ReadOptions {
@@ -75,7 +77,9 @@ fn files_of_other_programs_are_read_or_refused() {
                 let text = error.to_string();
                 assert!(words.iter().all(|word| text.contains(word)), "{}: {text}", case.name);
             }
-            (Ok(reading), Some(words)) => panic!("{}: read, and not refused with {words:?}: {reading:?}", case.name),
+            (Ok(reading), Some(words)) => {
+                panic!("{}: read, and not refused with {words:?}: {reading:?}", case.name)
+            }
             (Err(error), None) => panic!("{}: {error}", case.name),
         }
     }

@@ -133,7 +133,18 @@ impl Case {
             percent: r.once_in(8),
             order,
             marker: if r.once_in(4) {
-                Some(*r.of(&["-999", "-9999", "-1.23e34", "9.96921e36", "65535", "NaN", "", "n/a", "-99.9", "1e20"]))
+                Some(*r.of(&[
+                    "-999",
+                    "-9999",
+                    "-1.23e34",
+                    "9.96921e36",
+                    "65535",
+                    "NaN",
+                    "",
+                    "n/a",
+                    "-99.9",
+                    "1e20",
+                ]))
             } else {
                 None
             },
@@ -162,7 +173,11 @@ impl Case {
             "cm-1" => 1e7 / nm,
             _ => nm,
         };
-        let text = if self.unit == "cm-1" { format!("{value:.9}") } else { format!("{}", (value * 1e6).round() / 1e6) };
+        let text = if self.unit == "cm-1" {
+            format!("{value:.9}")
+        } else {
+            format!("{}", (value * 1e6).round() / 1e6)
+        };
         let text = if self.cell_units { format!("{text} nm") } else { text };
         self.number(text)
     }
@@ -170,7 +185,11 @@ impl Case {
     /// The value of a cell, and whether it is the one that is marked.
     fn value(&self, spectrum: usize, band: usize) -> String {
         if let (Some(marker), true) = (self.marker, self.is_marked(spectrum, band)) {
-            return self.number(if self.separator == ' ' && marker.is_empty() { "NaN".to_owned() } else { marker.to_owned() });
+            return self.number(if self.separator == ' ' && marker.is_empty() {
+                "NaN".to_owned()
+            } else {
+                marker.to_owned()
+            });
         }
         let value = self.spectra[spectrum][band];
         match self.percent {
@@ -186,7 +205,11 @@ impl Case {
     }
 
     fn title(&self) -> String {
-        let stated = if self.unit_stated { format!("Wellenlänge [{}]", self.unit) } else { "Wellenlänge".to_owned() };
+        let stated = if self.unit_stated {
+            format!("Wellenlänge [{}]", self.unit)
+        } else {
+            "Wellenlänge".to_owned()
+        };
         if self.separator == ' ' { stated.replace(' ', "_") } else { stated }
     }
 
@@ -209,7 +232,8 @@ impl Case {
             }
             rows.push(head);
             for (spectrum, name) in self.names().iter().enumerate() {
-                let mut row: Vec<String> = (0..self.wavelengths.len()).map(|band| self.value(spectrum, band)).collect();
+                let mut row: Vec<String> =
+                    (0..self.wavelengths.len()).map(|band| self.value(spectrum, band)).collect();
                 if self.ids != Ids::None {
                     row.insert(0, name.clone());
                 }
@@ -226,7 +250,9 @@ impl Case {
             }
         }
         let mut text = String::new();
-        for line in ["Instrument: model 3 (größer)", "Operator: nobody", "Measured in May"].iter().take(self.before) {
+        for line in
+            ["Instrument: model 3 (größer)", "Operator: nobody", "Measured in May"].iter().take(self.before)
+        {
             let _ = write!(text, "{line}{}", self.ending);
         }
         if self.comment {
@@ -295,7 +321,9 @@ impl Case {
                         let found = table.spectrum(spectrum)[band];
                         match (self.is_marked(spectrum, at(band)), self.marker) {
                             (true, Some(marker)) => match marker.parse::<f64>() {
-                                Ok(value) if !value.is_nan() => near(found, value) || near(found, value / 100.0),
+                                Ok(value) if !value.is_nan() => {
+                                    near(found, value) || near(found, value / 100.0)
+                                }
                                 _ => found.is_nan(),
                             },
                             _ => near(found, self.spectra[spectrum][at(band)]),
@@ -345,7 +373,9 @@ fn tables_are_read_rightly_or_refused() {
                 None
             }
             (Ok(_), Some(error)) => Some(format!("judged without need: {error}")),
-            (Ok(reading), None) if !case.is_right(&reading.table) => Some(format!("read wrongly: {reading:?}")),
+            (Ok(reading), None) if !case.is_right(&reading.table) => {
+                Some(format!("read wrongly: {reading:?}"))
+            }
             (Ok(reading), None) if case.marker.is_some_and(is_number) => {
                 Some(format!("a marker is taken for a value: {reading:?}"))
             }
@@ -360,13 +390,19 @@ fn tables_are_read_rightly_or_refused() {
         if let Some(fault) = fault {
             let text: String = case.text().replace('\r', "\n").lines().take(6).collect::<Vec<_>>().join("\n");
             let lines: Vec<String> = text.lines().map(|line| line.chars().take(100).collect()).collect();
-            let settings: String = format!("{case:?}").split(", wavelengths").next().unwrap_or_default().to_owned();
+            let settings: String =
+                format!("{case:?}").split(", wavelengths").next().unwrap_or_default().to_owned();
             let fault: String = fault.chars().take(500).collect();
             wrong.push(format!("{settings}\n{}\n--> {fault}", lines.join("\n")));
         }
     }
     println!("{count} tables: {right} read rightly, {refused} refused, {} otherwise", wrong.len());
-    assert!(wrong.is_empty(), "{} of {count}; the first:\n{}", wrong.len(), wrong[..wrong.len().min(12)].join("\n\n"));
+    assert!(
+        wrong.is_empty(),
+        "{} of {count}; the first:\n{}",
+        wrong.len(),
+        wrong[..wrong.len().min(12)].join("\n\n")
+    );
     assert!(right * 4 > count as usize, "too few are read: {right} of {count}");
 }
 
@@ -376,7 +412,8 @@ fn a_wrong_reading_is_noticed() {
     let mut noticed = 0;
     for seed in 0..200 {
         let case = Case::new(seed);
-        let spectra: Vec<Vec<f64>> = case.spectra.iter().map(|s| s.iter().map(|v| v * 1.001).collect()).collect();
+        let spectra: Vec<Vec<f64>> =
+            case.spectra.iter().map(|s| s.iter().map(|v| v * 1.001).collect()).collect();
         let mut wavelengths = case.wavelengths.clone();
         wavelengths.sort_by(f64::total_cmp);
         wavelengths.dedup();

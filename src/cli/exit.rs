@@ -148,6 +148,9 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
 pub(super) fn data_remedy(error: &anyhow::Error) -> Option<String> {
     let remedy = match (error.downcast_ref::<DatasetError>(), error.downcast_ref::<Unphysical>()) {
         (Some(DatasetError::Read { .. }), _) => return None,
+        (Some(DatasetError::NotMeasured { remedy, .. }), _) if !remedy.is_empty() => {
+            return Some(" (--wavelengths, --missing drop or interpolate)".to_owned());
+        }
         (Some(error), _) => error.remedy(),
         (_, Some(error)) => error.remedy,
         _ => match error.downcast_ref::<FitError>() {

@@ -3,24 +3,28 @@
 use std::path::{Path, PathBuf};
 
 use spectroll::output::write_file;
-use spectroll::{Dataset, Extrapolation, Fit, Grid, Model, Normalization, SpectraCounts, SpectrumKind, Table};
+use spectroll::{
+    Dataset, Extrapolation, Fit, Grid, Missing, Model, Normalization, ResampleMethod, Resampling,
+    SpectraCounts, SpectrumKind, Table,
+};
 
 use super::exit::Usage;
 use super::if_exists;
 use super::options::DataArguments;
 use super::parse::{counted, grouped};
 use super::run::Waiting;
+use super::wavelengths::{Wavelengths, wavelengths};
 
 /// Fit a model to measured spectra
 ///
 /// Files are text of any dialect with spectra in columns or rows, MATLAB's, HDF5, NumPy's (.npy, .npz), Parquet, Zarr,
 /// spreadsheets, ENVI libraries, JCAMP-DX or TM-27, told by their content; `spectroll look` shows how one is read.
 /// FILE:ARRAY picks one of several matrices, FILE:ARRAY@NAME its wavelengths, and FILE@380:5:780 says at which wavelengths
-/// it was measured where it does not. The names munsell, vrhel and granada stand for built-in tables. Several are fitted
-/// together.
+/// it was measured where it does not. The names munsell, vrhel, granada and others stand for built-in tables. Several are
+/// fitted together.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Files of spectra, or munsell, vrhel, granada
+    /// Files of spectra, or munsell, vrhel, granada, macbeth, koivisto, krinov, houser
     #[arg(required = true, value_name = "FILE")]
     files: Vec<String>,
     /// The number of components, or the share of the variance that they must explain, as in 99.9%
@@ -30,9 +34,16 @@ pub(crate) struct Arguments {
     /// Kind of the spectra [default: as the name of the variable says: sur_X, spd_X, daylightX]
     #[arg(long, value_enum)]
     kind: Option<SpectrumKind>,
-    /// The wavelengths, start:step:stop in nm [default: 400:10:700]
-    #[arg(long, value_name = "GRID")]
-    wavelengths: Option<Grid>,
+    /// The wavelengths of the model, in nm: start:step:stop, a list as in 443,490,560, a file of them, or as-measured
+    /// [default: 400:10:700]
+    #[arg(long, value_name = "GRID|FILE|as-measured", value_parser = wavelengths)]
+    wavelengths: Option<Wavelengths>,
+    /// Bring data to these wavelengths by
+    #[arg(long, value_enum, default_value = "auto")]
+    resample: ResampleMethod,
+    /// Treat spectra that lack a value which these wavelengths need as
+    #[arg(long, value_enum, default_value = "error")]
+    missing: Missing,
     /// Divide each spectrum by this first [default: mean for illuminants, none for reflectances]
     #[arg(long, value_enum)]
     normalize: Option<Normalization>,
@@ -75,15 +86,26 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ))
         .into());
     }
-    let grid = arguments.wavelengths.unwrap_or(Grid::DEFAULT);
+    let given = match &arguments.wavelengths {
+        Some(Wavelengths::Grid(grid)) => Some(grid.clone()),
+        Some(Wavelengths::AsMeasured) | None => None,
+    };
     let mut tables = Vec::new();
     for file in &arguments.files {
-        let (table, notes) = arguments.data.table(file, arguments.wavelengths, grid)?;
+        let (table, notes) = arguments.data.table(file, given.as_ref())?;
         notes.iter().for_each(|note| tell!("{}: {note}", table.name()));
         tables.push(table);
     }
     let kind = kind(arguments, &tables)?;
-    let data = Dataset::new(&tables, grid, arguments.extrapolate)?;
+    let grid = match &arguments.wavelengths {
+        Some(Wavelengths::AsMeasured) => Dataset::measured_grid(&tables)?,
+        _ => given.unwrap_or(Grid::DEFAULT),
+    };
+    let settings = Resampling::default()
+        .method(arguments.resample)
+        .extrapolation(arguments.extrapolate)
+        .missing(arguments.missing);
+    let data = Dataset::new(&tables, grid, settings)?;
     let mut fit = match arguments.components {
         Components::Count(components) => Fit::new(kind).components(components),
         Components::Share(share) => Fit::new(kind).explain(share),
@@ -122,6 +144,9 @@ fn report(model: &Model, data: &Dataset, path: &Path) {
         model.kind(),
         model.grid(),
     );
+    for note in data.notes() {
+        tell!("  {note}");
+    }
 }
 
 /// Kind of the spectra: as asked, else as their names say, if those agree.

@@ -14,6 +14,7 @@ use super::exit::Usage;
 use super::inspect::line;
 use super::options::DataArguments;
 use super::parse::{counted, grouped};
+use super::wavelengths::grid;
 use super::{if_exists, picture};
 
 /// Show how files of spectra are read, before anything is fitted to them
@@ -25,8 +26,9 @@ pub(crate) struct Arguments {
     /// Kind of the spectra [default: as the file says, else both are tried]
     #[arg(long, value_enum)]
     kind: Option<SpectrumKind>,
-    /// The wavelengths of the model that the spectra are for, start:step:stop in nm [default: 400:10:700]
-    #[arg(long, value_name = "GRID")]
+    /// The wavelengths of the model that the spectra are for, in nm: start:step:stop, a list, or a file of them
+    /// [default: 400:10:700]
+    #[arg(long, value_name = "GRID|FILE", value_parser = grid)]
     wavelengths: Option<Grid>,
     /// Draw the spectra of one file, as measured and on the grid, into this file: .svg, .png or .pdf
     #[arg(short, long, value_name = "PATH")]
@@ -43,7 +45,7 @@ pub(crate) struct Arguments {
     data: DataArguments,
 }
 
-/// How a file was read, for programs.
+/// Account of how a file was read, for programs.
 #[derive(Serialize)]
 struct Facts {
     file: String,
@@ -67,7 +69,7 @@ struct Facts {
     kind: Option<SpectrumKind>,
     notes: Vec<String>,
     others: Vec<String>,
-    /// What `fit` would say of the spectra as reflectances and as illuminants.
+    /// Verdicts of `fit` on the spectra as reflectances and as illuminants.
     as_reflectances: Option<String>,
     as_illuminants: Option<String>,
 }
@@ -78,20 +80,24 @@ const SOUND: &str = "nothing is wrong with them";
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
     if arguments.output.is_some() && arguments.files.len() > 1 {
-        return Err(Usage(format!("-o draws one file, and there are {}: look at them one by one", arguments.files.len())).into());
+        return Err(Usage(format!(
+            "-o draws one file, and there are {}: look at them one by one",
+            arguments.files.len()
+        ))
+        .into());
     }
-    let grid = arguments.wavelengths.unwrap_or(Grid::DEFAULT);
+    let grid = arguments.wavelengths.clone().unwrap_or(Grid::DEFAULT);
     let mut all = Vec::new();
     for name in &arguments.files {
         let reading = match spectroll::BuiltinTable::named(name) {
             Some(builtin) => Reading::builtin(builtin),
-            None => arguments.data.read(name, arguments.wavelengths)?,
+            None => arguments.data.read(name, arguments.wavelengths.as_ref())?,
         };
         let scale = arguments.data.scale();
-        let facts = facts(name, &reading, arguments, grid);
+        let facts = facts(name, &reading, arguments, &grid);
         if let (Some(path), Some(format)) = (&arguments.output, format) {
             let table = reading.table.clone().scaled(scale);
-            let gridded = Dataset::new(std::slice::from_ref(&table), grid, Extrapolation::Error);
+            let gridded = Dataset::new(std::slice::from_ref(&table), grid.clone(), Extrapolation::Error);
             let refusal = gridded.as_ref().err().map(DatasetError::to_string).unwrap_or_default();
             let drawing = picture::look::Picture {
                 name,
@@ -114,7 +120,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: Grid) -> Facts {
+fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: &Grid) -> Facts {
     let table = &reading.table;
     let wavelengths = table.wavelengths();
     let steps: Vec<f64> = wavelengths.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -135,12 +141,15 @@ fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: Grid) -> Fa
     let judged = |of: SpectrumKind| {
         kind.is_none_or(|kind| kind == of).then(|| {
             let judge = || -> anyhow::Result<String> {
-                let data = Dataset::new(std::slice::from_ref(&scaled), grid, Extrapolation::Error)?;
+                let data = Dataset::new(std::slice::from_ref(&scaled), grid.clone(), Extrapolation::Error)?;
                 let counts = data.judge(of)?;
-                let mut said = Vec::new();
+                let mut said = data.notes().to_vec();
                 for (count, values) in [(counts.above_one, "above 1"), (counts.below_zero, "below 0")] {
                     if count > 0 {
-                        said.push(format!("{} with values {values}", counted(count as u64, "spectrum", "spectra")));
+                        said.push(format!(
+                            "{} with values {values}",
+                            counted(count as u64, "spectrum", "spectra")
+                        ));
                     }
                 }
                 Ok(if said.is_empty() { SOUND.to_owned() } else { said.join(", ") })
@@ -175,10 +184,11 @@ fn facts(name: &str, reading: &Reading, arguments: &Arguments, grid: Grid) -> Fa
     }
 }
 
-/// How a file was read, in a line that fits above a picture.
+/// Account of how a file was read, in a line that fits above a picture.
 fn note(facts: &Facts) -> String {
     let layout = facts.layout.split(": ").next().unwrap_or_default();
-    let note = format!("{}; {layout}; {} to {} nm", facts.format, short(facts.first_nm), short(facts.last_nm));
+    let note =
+        format!("{}; {layout}; {} to {} nm", facts.format, short(facts.first_nm), short(facts.last_nm));
     note.chars().take(100).collect()
 }
 
@@ -210,9 +220,11 @@ fn text(facts: &Facts) -> String {
         ),
     };
     line(&mut text, "missing", &missing);
-    let values = format!("{} to {}, {} on average", short(facts.smallest), short(facts.largest), short(facts.mean));
+    let values =
+        format!("{} to {}, {} on average", short(facts.smallest), short(facts.largest), short(facts.mean));
     line(&mut text, "values", &values);
-    let kind = facts.kind.map_or("not told by the file: pass --kind to fit".to_owned(), |kind| format!("{kind}s"));
+    let kind =
+        facts.kind.map_or("not told by the file: pass --kind to fit".to_owned(), |kind| format!("{kind}s"));
     line(&mut text, "kind", &kind);
     for (index, note) in facts.notes.iter().enumerate() {
         line(&mut text, if index == 0 { "notes" } else { "" }, note);
@@ -220,7 +232,8 @@ fn text(facts: &Facts) -> String {
     if !facts.others.is_empty() {
         line(&mut text, "also there", &facts.others.join(", "));
     }
-    for (label, verdict) in [("reflectances", &facts.as_reflectances), ("illuminants", &facts.as_illuminants)] {
+    for (label, verdict) in [("reflectances", &facts.as_reflectances), ("illuminants", &facts.as_illuminants)]
+    {
         if let Some(verdict) = verdict {
             line(&mut text, label, verdict);
         }

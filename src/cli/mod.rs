@@ -28,6 +28,7 @@ mod sample;
 mod scene;
 mod shader;
 mod verify;
+mod wavelengths;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -109,7 +110,9 @@ pub(crate) fn main() -> ExitCode {
             // Our messages hold their causes.
             match exit::data_remedy(&error) {
                 Some(options) if looks => tell!("error: {error}{options}"),
-                Some(options) => tell!("error: {error}{options}; `spectroll look FILE` shows how a file is read"),
+                Some(options) => {
+                    tell!("error: {error}{options}; `spectroll look FILE` shows how a file is read")
+                }
                 None => tell!("error: {error}{}", exit::remedy(&error)),
             }
             ExitCode::from(exit::code(&error))
@@ -142,10 +145,10 @@ fn model(name: &str) -> anyhow::Result<Model> {
 }
 
 /// The model of a name, where a built-in one is fitted at the grid that is asked for.
-fn model_at(name: &str, grid: Option<Grid>) -> anyhow::Result<Model> {
+fn model_at(name: &str, grid: Option<&Grid>) -> anyhow::Result<Model> {
     if Model::BUILTIN.contains(&name) {
         return Ok(match grid {
-            Some(grid) => Model::builtin_at(name, grid)?,
+            Some(grid) => Model::builtin_at(name, grid.clone())?,
             None => Model::builtin(name)?,
         });
     }
@@ -161,7 +164,7 @@ fn model_at(name: &str, grid: Option<Grid>) -> anyhow::Result<Model> {
         }
         other => other.into(),
     })?;
-    if let Some(grid) = grid.filter(|grid| *grid != model.grid()) {
+    if let Some(grid) = grid.filter(|&grid| grid != model.grid()) {
         anyhow::bail!(Usage(format!(
             "--wavelengths {grid}: the grid belongs to the model {name:?}, and is {}: fit it with spectroll fit \
              --wavelengths",

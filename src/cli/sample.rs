@@ -13,6 +13,7 @@ use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, Purpose, RecipeArguments};
 use super::parse::{count, counted, seed};
 use super::run::{self, DryRun, Waiting};
+use super::wavelengths::grid;
 use super::{interrupt, model_at};
 
 /// Draw spectra from a model
@@ -21,11 +22,12 @@ use super::{interrupt, model_at};
 /// made again, or on another machine, with --start or --shard.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// A model file, or munsell-vrhel, granada, munsell-vrhel-5nm, granada-5nm
+    /// A model file, or a name of `spectroll models`, such as munsell-vrhel or granada
     #[arg(value_name = "MODEL")]
     model: String,
-    /// The wavelengths of a built-in model, in nm, at which it is fitted [default: those of its name]
-    #[arg(long, value_name = "START:STEP:STOP")]
+    /// The wavelengths of a built-in model, in nm, at which it is fitted: a grid, a list as in 443,490,560, or a file of
+    /// them [default: those of its name]
+    #[arg(long, value_name = "START:STEP:STOP|FILE", value_parser = grid)]
     wavelengths: Option<Grid>,
     /// Number of spectra (1000000, 1e6 and 1M are the same; k, M, G and T are powers of 1000)
     #[arg(short = 'n', long, value_name = "COUNT", value_parser = count, allow_negative_numbers = true)]
@@ -85,7 +87,7 @@ struct Report {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = arguments.output.resolve(Purpose::of(arguments.dry_run))?;
     let waiting = Waiting::begin("preparing the draws", arguments.quiet);
-    let model = model_at(&arguments.model, arguments.wavelengths)?;
+    let model = model_at(&arguments.model, arguments.wavelengths.as_ref())?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
     drop(waiting);
@@ -174,7 +176,7 @@ fn report(
         tell!("{}: {kind}{spectra} of {}{above}", made.output, counted(made.bands as u64, "band", "bands"));
         let accepted = made.acceptance.map_or(String::new(), |a| format!(" ({:.4} % accepted)", 100.0 * a));
         tell!("  {}{accepted}, seed {}", counted(attempts, "candidate", "candidates"), made.seed);
-        if let Some(warning) = run::impossible_mean(model) {
+        for warning in run::doubts(model) {
             tell!("  {warning}");
         }
         let rate = match draws {

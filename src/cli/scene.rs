@@ -308,7 +308,7 @@ impl Job<'_> {
                 tell!("  {group}: {} drawn{accepted}{above}", counted(summary.draws, "spectrum", "spectra"));
             }
             for (group, model) in self.scene.models() {
-                if let Some(warning) = run::impossible_mean(model) {
+                for warning in run::doubts(model) {
                     tell!("  {group}: {warning}");
                 }
             }

@@ -7,6 +7,7 @@ use spectroll::Grid;
 use spectroll::output::write_file;
 
 use super::options::RecipeArguments;
+use super::wavelengths::grid;
 use super::{if_exists, model_at};
 
 /// Print WGSL functions that draw spectra, for a shader of your own
@@ -20,8 +21,9 @@ pub(crate) struct Arguments {
     /// A model file or the name of a built-in model
     #[arg(value_name = "MODEL")]
     model: String,
-    /// The wavelengths of a built-in model, in nm, at which it is fitted [default: those of its name]
-    #[arg(long, value_name = "START:STEP:STOP")]
+    /// The wavelengths of a built-in model, in nm, at which it is fitted: a grid, a list as in 443,490,560, or a file of
+    /// them [default: those of its name]
+    #[arg(long, value_name = "START:STEP:STOP|FILE", value_parser = grid)]
     wavelengths: Option<Grid>,
     #[command(flatten)]
     request: RecipeArguments,
@@ -40,7 +42,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let model = model_at(&arguments.model, arguments.wavelengths)?;
+    let model = model_at(&arguments.model, arguments.wavelengths.as_ref())?;
     let recipe = arguments.request.recipe(&model)?;
     let text = recipe.wgsl(&arguments.prefix)?;
     let import = match arguments.naga_oil {

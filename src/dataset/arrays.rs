@@ -133,7 +133,8 @@ pub(super) fn choose(path: &Path, arrays: &Arrays, options: &ReadOptions) -> Res
         ([], None) => return Err(nothing(path, arrays, options)),
         ([one], _) => one,
         (several, _) => {
-            let is_draws = |(array, _): &&(&Array, Wave)| arrays.kind.is_some() && DRAWS.contains(&array.own_name());
+            let is_draws =
+                |(array, _): &&(&Array, Wave)| arrays.kind.is_some() && DRAWS.contains(&array.own_name());
             match several.iter().find(is_draws) {
                 Some(draws) => draws,
                 None => {
@@ -165,14 +166,18 @@ fn wave(array: &Array, options: &ReadOptions) -> Option<Wave> {
     let name = array.own_name();
     let is_sampling = name == "S" || name.strip_prefix("S_").is_some();
     let (values, source) = match *array.values.as_slice() {
-        [start, step, count] if is_sampling && count.fract() == 0.0 && axis::check(&array.values).is_err() => {
+        [start, step, count]
+            if is_sampling && count.fract() == 0.0 && axis::check(&array.values).is_err() =>
+        {
             let suffix = name.strip_prefix("S_").unwrap_or_default().to_ascii_lowercase();
             let grid = Grid::new(start, step, count as usize).ok()?;
             (grid.wavelengths().collect(), Source::Sampling(suffix))
         }
         _ if array.values.len() < 2 => return None,
         _ => {
-            let is_named = is_sampling || is_wavelength_word(name) || matches!(name.to_lowercase().as_str(), "bands" | "band");
+            let is_named = is_sampling
+                || is_wavelength_word(name)
+                || matches!(name.to_lowercase().as_str(), "bands" | "band");
             let source = if is_named { Source::Named } else { Source::Plain };
             (array.values.clone(), source)
         }
@@ -235,8 +240,13 @@ fn candidates<'a>(
             Ok(Some(wave)) => wave,
             Ok(None) => continue,
             Err(candidates) => {
-                let candidates = candidates.into_iter().map(|wave| format!("{}@{wave}", array.name)).collect();
-                return Err(DatasetError::Ambiguous { path: path.to_owned(), what: "wavelengths", candidates });
+                let candidates =
+                    candidates.into_iter().map(|wave| format!("{}@{wave}", array.name)).collect();
+                return Err(DatasetError::Ambiguous {
+                    path: path.to_owned(),
+                    what: "wavelengths",
+                    candidates,
+                });
             }
         };
         // A vector of wavelengths is none of spectra.
@@ -246,12 +256,16 @@ fn candidates<'a>(
     }
     // Vectors beside matrices are means, errors and labels.
     if options.array.is_none() && found.iter().any(|(array, _)| !array.is_vector()) {
-        found.retain(|(array, _)| !array.is_vector());
+        found.retain(|(array, wave)| {
+            let is_sampled = matches!(&wave.source, Source::Sampling(suffix) if !suffix.is_empty());
+            !array.is_vector() || is_sampled
+        });
     }
     // One matrix may have two names.
     let mut distinct: Vec<(&Array, Wave)> = Vec::new();
     for (array, wave) in found {
-        let is_same = |(other, _): &(&Array, Wave)| other.sides == array.sides && other.values == array.values;
+        let is_same =
+            |(other, _): &(&Array, Wave)| other.sides == array.sides && other.values == array.values;
         if !distinct.iter().any(is_same) {
             distinct.push((array, wave));
         }
@@ -271,14 +285,11 @@ fn wave_of(array: &Array, waves: &[Wave]) -> Result<Option<Wave>, Vec<String>> {
     let group = array.group();
     let (is_given, is_named) = (|w: &Wave| w.source == Source::Given, |w: &Wave| w.source == Source::Named);
     let is_sampling = |w: &Wave| matches!(w.source, Source::Sampling(_));
-    let is_plain = |w: &Wave| w.source == Source::Plain && w.group == group && (axis::is_even(&w.values) || w.values.len() >= 8);
-    let levels: [&dyn Fn(&Wave) -> bool; 5] = [
-        &is_given,
-        &|w| is_named(w) && w.group == group,
-        &|w| is_named(w),
-        &is_sampling,
-        &is_plain,
-    ];
+    let is_plain = |w: &Wave| {
+        w.source == Source::Plain && w.group == group && (axis::is_even(&w.values) || w.values.len() >= 8)
+    };
+    let levels: [&dyn Fn(&Wave) -> bool; 5] =
+        [&is_given, &|w| is_named(w) && w.group == group, &|w| is_named(w), &is_sampling, &is_plain];
     for level in levels {
         let mut at_level: Vec<&Wave> = waves.iter().filter(|wave| level(wave)).filter(fits).collect();
         at_level.dedup_by(|a, b| a.values == b.values);
@@ -380,7 +391,9 @@ fn side(
         [side] => Ok((*side, format!("{bands} wavelengths fit one side alone"))),
         [_, ..] if is_own => Ok((0, "as this program writes draws".to_owned())),
         // The convention for functions to integrate with is rows.
-        [_, second, ..] if is_convention && by_name.starts_with("t_") => Ok((*second, "by the name, T_x".to_owned())),
+        [_, second, ..] if is_convention && by_name.starts_with("t_") => {
+            Ok((*second, "by the name, T_x".to_owned()))
+        }
         [_, ..] if is_convention => Ok((0, "by the convention of S_x".to_owned())),
         _ => Err(format!(
             "{} has {bands} values along more than one side, so that its spectra may be its columns or its rows: say which",
@@ -408,7 +421,10 @@ fn nothing(path: &Path, arrays: &Arrays, options: &ReadOptions) -> DatasetError 
     // A vector that is called wavelengths, and whose numbers are none.
     let named = arrays.all.iter().find(|array| {
         let name = array.own_name();
-        array.is_vector() && array.values.len() > 1 && is_wavelength_word(name) && wave(array, options).is_none()
+        array.is_vector()
+            && array.values.len() > 1
+            && is_wavelength_word(name)
+            && wave(array, options).is_none()
     });
     if let Some(array) = named {
         let (reason, remedy) = fault(array, options);
@@ -424,9 +440,8 @@ fn nothing(path: &Path, arrays: &Arrays, options: &ReadOptions) -> DatasetError 
             remedy: Remedy::MeasuredAt,
         };
     }
-    let has_wave = arrays.all.iter().any(|array| {
-        wave(array, options).is_some_and(|wave| wave.source != Source::Plain)
-    });
+    let has_wave =
+        arrays.all.iter().any(|array| wave(array, options).is_some_and(|wave| wave.source != Source::Plain));
     match matrices.as_slice() {
         [array] if !has_wave => {
             let bands = array.sides[0];

@@ -44,11 +44,18 @@ impl fmt::Display for AxisFault {
                 write!(f, "{value} stands twice, as number {} and as number {}", a + 1, b + 1)
             }
             AxisFault::Turns(i, before, after) => {
-                write!(f, "number {} is {after} after {before}, where those before it run the other way", i + 1)
+                write!(
+                    f,
+                    "number {} is {after} after {before}, where those before it run the other way",
+                    i + 1
+                )
             }
             AxisFault::Counter(first, last) => write!(f, "they count from {first} to {last}"),
             AxisFault::Range(low, high) => match self.guess() {
-                Some(unit) => write!(f, "they run from {low} to {high}, which no wavelengths in nm do; are they in {unit}?"),
+                Some(unit) => write!(
+                    f,
+                    "they run from {low} to {high}, which no wavelengths in nm do; are they in {unit}?"
+                ),
                 None => write!(f, "they run from {low} to {high}, which no wavelengths in nm do"),
             },
         }
@@ -124,6 +131,11 @@ mod tests {
         ] {
             assert!(check(&values).unwrap_err().to_string().contains(message), "{values:?}");
         }
-        assert!(is_even(&even) && !counts(&even) && counts(&[1001.0, 1002.0]) && !is_even(&[400.0, 410.0, 425.0, 430.0]));
+        assert!(
+            is_even(&even)
+                && !counts(&even)
+                && counts(&[1001.0, 1002.0])
+                && !is_even(&[400.0, 410.0, 425.0, 430.0])
+        );
     }
 }

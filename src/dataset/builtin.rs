@@ -23,6 +23,16 @@ pub enum BuiltinTable {
     /// to 1100 nm by 5 nm. Each is a combination of 80 principal components, which differs from what was
     /// measured by 10^-3 of its mean power (root mean square); `data/README.md` says what that does to fits.
     Granada,
+    /// 24 patches of a Macbeth ColorChecker: reflectance, 385 to 730 nm by 5 nm.
+    Macbeth,
+    /// 219 leaves and flowers measured at Kuopio (the natural colours of the University of Eastern Finland): reflectance,
+    /// 400 to 700 nm by 5 nm, in steps of 1/4096.
+    Koivisto,
+    /// 191 natural surfaces of landscapes, roads and roofs measured by Krinov (1947): reflectance, 400 to 650 nm by 10 nm.
+    Krinov,
+    /// 401 lamps and models of lamps collected by Houser et al. (2013): relative power, 1 at its largest, 380 to 780 nm by
+    /// 5 nm.
+    Houser,
     /// CIE standard illuminant D65: relative power, 380 to 780 nm by 5 nm.
     D65,
     /// CIE 1931 colour matching functions x, y, z: 360 to 830 nm by 1 nm.
@@ -37,6 +47,10 @@ impl BuiltinTable {
         BuiltinTable::Munsell,
         BuiltinTable::Vrhel,
         BuiltinTable::Granada,
+        BuiltinTable::Macbeth,
+        BuiltinTable::Koivisto,
+        BuiltinTable::Krinov,
+        BuiltinTable::Houser,
         BuiltinTable::D65,
         BuiltinTable::Xyz1931,
         BuiltinTable::CieDaylight,
@@ -53,6 +67,10 @@ impl BuiltinTable {
             BuiltinTable::Munsell => "munsell",
             BuiltinTable::Vrhel => "vrhel",
             BuiltinTable::Granada => "granada",
+            BuiltinTable::Macbeth => "macbeth",
+            BuiltinTable::Koivisto => "koivisto",
+            BuiltinTable::Krinov => "krinov",
+            BuiltinTable::Houser => "houser",
             BuiltinTable::D65 => "d65",
             BuiltinTable::Xyz1931 => "xyz1931",
             BuiltinTable::CieDaylight => "cie-daylight",
@@ -65,6 +83,10 @@ impl BuiltinTable {
             BuiltinTable::Munsell => ("sur_nickerson", include_bytes!("../../data/sur_nickerson.mat")),
             BuiltinTable::Vrhel => ("sur_vrhel", include_bytes!("../../data/sur_vrhel.mat")),
             BuiltinTable::Granada => return granada(self.name()),
+            BuiltinTable::Macbeth => ("sur_macbeth", include_bytes!("../../data/sur_macbeth.mat")),
+            BuiltinTable::Koivisto => ("sur_koivisto", include_bytes!("../../data/sur_koivisto.mat")),
+            BuiltinTable::Krinov => ("sur_krinov", include_bytes!("../../data/sur_krinov.mat")),
+            BuiltinTable::Houser => ("spd_houser", include_bytes!("../../data/spd_houser.mat")),
             BuiltinTable::D65 => ("spd_D65", include_bytes!("../../data/spd_D65.mat")),
             BuiltinTable::Xyz1931 => ("T_xyz1931", include_bytes!("../../data/T_xyz1931.mat")),
             BuiltinTable::CieDaylight => ("B_cieday", include_bytes!("../../data/B_cieday.mat")),
@@ -75,9 +97,13 @@ impl BuiltinTable {
         let mut table = reading.expect("compiled-in tables are readable").table;
         table.name = self.name().to_owned();
         table.source = table.name.clone();
-        if self == BuiltinTable::Munsell {
-            // The file runs from 380 to 780 nm, but was padded with zeros where nothing was measured.
-            table.crop(400.0, 700.0);
+        match self {
+            // These files run from 380 to 780 nm, but were padded with zeros where nothing was measured.
+            BuiltinTable::Munsell => table.crop(400.0, 700.0),
+            BuiltinTable::Macbeth => table.crop(385.0, 730.0),
+            // Whole numbers of 12 bits.
+            BuiltinTable::Koivisto => return table.scaled(1.0 / 4096.0),
+            _ => {}
         }
         table
     }
@@ -128,6 +154,10 @@ mod tests {
             ("munsell", 462, 400.0, 700.0, 61, Some(SpectrumKind::Reflectance)),
             ("vrhel", 170, 390.0, 730.0, 171, Some(SpectrumKind::Reflectance)),
             ("granada", 2600, 300.0, 1100.0, 161, Some(SpectrumKind::Illuminant)),
+            ("macbeth", 24, 385.0, 730.0, 70, Some(SpectrumKind::Reflectance)),
+            ("koivisto", 219, 400.0, 700.0, 61, Some(SpectrumKind::Reflectance)),
+            ("krinov", 191, 400.0, 650.0, 26, Some(SpectrumKind::Reflectance)),
+            ("houser", 401, 380.0, 780.0, 81, Some(SpectrumKind::Illuminant)),
             ("d65", 1, 380.0, 780.0, 81, Some(SpectrumKind::Illuminant)),
             ("xyz1931", 3, 360.0, 830.0, 471, None),
             ("cie-daylight", 3, 380.0, 780.0, 81, None),
@@ -150,5 +180,20 @@ mod tests {
         assert_eq!(at(BuiltinTable::D65, 0, 560.0), 100.0);
         assert_eq!(at(BuiltinTable::Xyz1931, 1, 555.0), 1.0);
         assert_eq!(at(BuiltinTable::CieDaylight, 0, 560.0), 100.0);
+    }
+
+    /// Reflectances are fractions, and no table has a band in which nothing was measured.
+    #[test]
+    fn values_are_physical_and_no_band_is_padding() {
+        for table in BuiltinTable::ALL.iter().map(|builtin| builtin.table()) {
+            let values = || (0..table.len()).map(|spectrum| table.spectrum(spectrum));
+            if table.kind().is_some() {
+                let is_fraction = |&value: &f64| (0.0..=1.0).contains(&value);
+                let is_right =
+                    |value: &f64| table.kind() == Some(SpectrumKind::Illuminant) || is_fraction(value);
+                assert!(values().flatten().all(is_right), "{}", table.name());
+                assert!((0..table.wavelengths().len()).all(|band| values().any(|s| s[band] > 0.0)));
+            }
+        }
     }
 }

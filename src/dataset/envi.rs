@@ -19,13 +19,18 @@ pub(super) struct Header {
 
 /// The header of a file, where it is one, or has one beside it and is no text of its own.
 pub(super) fn header(path: &Path, bytes: &[u8]) -> Result<Option<Header>, DatasetError> {
-    let is_header = |bytes: &[u8]| bytes.starts_with(b"ENVI\n") || bytes.starts_with(b"ENVI\r") || bytes.starts_with(b"ENVI ");
+    let is_header = |bytes: &[u8]| {
+        bytes.starts_with(b"ENVI\n") || bytes.starts_with(b"ENVI\r") || bytes.starts_with(b"ENVI ")
+    };
     if is_header(bytes) {
         let stem = path.with_extension("");
         let beside = ["sli", "dat", "img", "bin"].into_iter().map(|extension| path.with_extension(extension));
         let data = beside.chain([stem]).find(|data| data.is_file() && data != path);
         let Some(data) = data else {
-            return Err(failed(path, "the file of numbers that it describes (.sli) is not beside it".to_owned()));
+            return Err(failed(
+                path,
+                "the file of numbers that it describes (.sli) is not beside it".to_owned(),
+            ));
         };
         return Ok(Some(Header { entries: entries(&text::decode(bytes).0), data }));
     }
@@ -72,7 +77,10 @@ pub(super) fn arrays(path: &Path, header: &Header) -> Result<Arrays, DatasetErro
         text.parse().map_err(|_| wrong(format!("{name} = {text:?} in its header is no whole number")))
     };
     if !entry("file type").is_some_and(|kind| kind.to_lowercase().contains("spectral library")) {
-        return Err(wrong("it is an image and no library: export the spectra of its pixels as text or as a NumPy array".to_owned()));
+        return Err(wrong(
+            "it is an image and no library: export the spectra of its pixels as text or as a NumPy array"
+                .to_owned(),
+        ));
     }
     let (bands, spectra) = (number("samples")?, number("lines")?);
     let offset = if entry("header offset").is_some() { number("header offset")? } else { 0 };
@@ -114,7 +122,8 @@ pub(super) fn arrays(path: &Path, header: &Header) -> Result<Arrays, DatasetErro
         notes.push(format!("values were divided by the reflectance scale factor, {factor}"));
     }
     if let Some(ignored) = entry("data ignore value").and_then(|text| text.parse::<f64>().ok()) {
-        let gone = values.iter_mut().filter(|value| **value == ignored).map(|value| *value = f64::NAN).count();
+        let gone =
+            values.iter_mut().filter(|value| **value == ignored).map(|value| *value = f64::NAN).count();
         notes.push(format!("{gone} values are missing by the data ignore value, {ignored}"));
     }
     let mut found = Arrays {

@@ -14,7 +14,7 @@ pub enum Remedy {
     None,
     /// A value that means "not measured" ([`ReadOptions::missing_values`](super::ReadOptions::missing_values)).
     MissingValue(f64),
-    /// Spectra with missing values are left out ([`Table::without_missing`](super::Table::without_missing)).
+    /// Spectra with missing values are left out ([`Missing`](super::Missing)).
     Missing,
     /// A factor for all values ([`Table::scaled`](super::Table::scaled)).
     Scale(f64),
@@ -51,7 +51,9 @@ pub enum DatasetError {
     Place { path: PathBuf, place: String, reason: String, remedy: Remedy },
     #[error("{path:?}: {reason}")]
     Layout { path: PathBuf, reason: String, remedy: Remedy },
-    #[error("{path:?} does not say at which wavelengths its {bands} bands are: give them, as start:step:stop")]
+    #[error(
+        "{path:?} does not say at which wavelengths its {bands} bands are: give them, as start:step:stop"
+    )]
     NoWavelengths { path: PathBuf, bands: usize },
     #[error(
         "{path:?} holds no matrix of spectra with its wavelengths beside it (X with S_X = [start step count], or a vector wavelength); it holds {found}"
@@ -74,13 +76,19 @@ pub enum DatasetError {
     )]
     NotFinite { name: String, spectrum: usize, wavelength: f64, value: f64 },
     #[error(
-        "spectrum {spectrum} of {name}: the value at {wavelength} nm is missing (NaN); choose a grid without that wavelength, or leave out spectra with missing values"
+        "spectrum {spectrum} of {name} has no value at {wavelength} nm, which the grid needs; {place}: choose a grid without it, \
+         leave such spectra out{remedy}"
     )]
-    Missing { name: String, spectrum: usize, wavelength: f64 },
+    NotMeasured { name: String, spectrum: usize, wavelength: f64, place: String, remedy: &'static str },
+    #[error(
+        "no spectrum of {name} has every value that the grid needs, the first of them none at {wavelength} nm (spectrum \
+         {spectrum}): choose a grid without it"
+    )]
+    AllDropped { name: String, spectrum: usize, wavelength: f64 },
+    #[error("{a} and {b} were measured at different wavelengths: choose a grid for both")]
+    Grids { a: String, b: String },
     #[error("{name} holds no spectra")]
     NoSpectra { name: String },
-    #[error("every spectrum of {name} lacks a value from {first} to {last} nm: none is left")]
-    NoneLeft { name: String, first: f64, last: f64 },
     #[error("{place}: the value at {wavelength} nm is {value}{reason}")]
     Value { place: String, wavelength: f64, value: f64, reason: String, remedy: Remedy },
     #[error("{place}: {reason}")]
@@ -101,8 +109,10 @@ impl DatasetError {
             | DatasetError::Value { remedy, .. }
             | DatasetError::Spectrum { remedy, .. } => *remedy,
             DatasetError::NoWavelengths { .. } => Remedy::MeasuredAt,
-            DatasetError::Missing { .. } => Remedy::Missing,
-            DatasetError::Range { .. } => Remedy::Wavelengths,
+            DatasetError::NotMeasured { .. } => Remedy::Missing,
+            DatasetError::AllDropped { .. } | DatasetError::Grids { .. } | DatasetError::Range { .. } => {
+                Remedy::Wavelengths
+            }
             _ => Remedy::None,
         }
     }

@@ -41,7 +41,9 @@ fn npy_parts(folder: &Path, parts: &[PathBuf], options: &ReadOptions) -> Result<
         let bytes = files::read(path)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let (name, is_part) = match stem.rsplit_once('-') {
-            Some((name, number)) if number.len() == 6 && number.bytes().all(|b| b.is_ascii_digit()) => (name.to_owned(), true),
+            Some((name, number)) if number.len() == 6 && number.bytes().all(|b| b.is_ascii_digit()) => {
+                (name.to_owned(), true)
+            }
             _ => (stem, false),
         };
         let failed = |reason| DatasetError::Format { path: path.clone(), format: "a NumPy array", reason };
@@ -54,7 +56,10 @@ fn npy_parts(folder: &Path, parts: &[PathBuf], options: &ReadOptions) -> Result<
             Some(last) => {
                 let end = last.sides.len() - 1;
                 if array.sides.len() != last.sides.len() || array.sides[..end] != last.sides[..end] {
-                    return Err(failed(format!("its sides differ from those of the part before it: {:?}", array.sides)));
+                    return Err(failed(format!(
+                        "its sides differ from those of the part before it: {:?}",
+                        array.sides
+                    )));
                 }
                 last.sides[end] += array.sides[end];
                 last.values.extend(array.values);
@@ -84,7 +89,11 @@ fn parquet_parts(folder: &Path, parts: &[PathBuf], options: &ReadOptions) -> Res
 
 #[cfg(not(feature = "parquet"))]
 fn parquet_parts(folder: &Path, _: &[PathBuf], _: &ReadOptions) -> Result<Reading, DatasetError> {
-    Err(super::format::not_built(folder, "Parquet", "this build leaves out Parquet: build it with the feature parquet"))
+    Err(super::format::not_built(
+        folder,
+        "Parquet",
+        "this build leaves out Parquet: build it with the feature parquet",
+    ))
 }
 
 /// Reads the `.spd` files of a folder, each of spectra at the same wavelengths.

@@ -8,8 +8,9 @@ use super::{DatasetError, envi, files, folder, hdf5_bytes, mat, npy, npz, spdx, 
 
 /// Endings of the names of tables, for those who ask without opening one.
 const ENDINGS: [&str; 30] = [
-    "mat", "h5", "hdf5", "he5", "nc", "nc4", "npy", "npz", "parquet", "pq", "zarr", "csv", "tsv", "txt", "dat", "asc", "dpt",
-    "spd", "prn", "xlsx", "xls", "xlsb", "ods", "sli", "spdx", "cgats", "it8", "ti3", "sp", "tab",
+    "mat", "h5", "hdf5", "he5", "nc", "nc4", "npy", "npz", "parquet", "pq", "zarr", "csv", "tsv", "txt",
+    "dat", "asc", "dpt", "spd", "prn", "xlsx", "xls", "xlsb", "ods", "sli", "spdx", "cgats", "it8", "ti3",
+    "sp", "tab",
 ];
 
 /// Kinds of files that are told by their first bytes, and are none of spectra that are read.
@@ -77,7 +78,11 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
     if decoded.trim_start().starts_with('{') {
         let is_model = decoded.contains("\"weight_covariance\"");
         let found = if is_model { "a model, fitted already" } else { "JSON" };
-        return Err(unknown(path, found, "expected measured spectra; write them as text, with wavelengths in the first column"));
+        return Err(unknown(
+            path,
+            found,
+            "expected measured spectra; write them as text, with wavelengths in the first column",
+        ));
     }
     if spdx::begins(&decoded) {
         return spdx::read(path, &decoded);

@@ -136,12 +136,17 @@ impl Walk {
             self.found.kind = text.and_then(|text| arrays::kind(&text)).or(self.found.kind);
             return Ok(());
         }
-        if attributes.contains_key("MATLAB_empty") || text(&attributes, "MATLAB_class").as_deref() == Some("char") {
+        if attributes.contains_key("MATLAB_empty")
+            || text(&attributes, "MATLAB_class").as_deref() == Some("char")
+        {
             return Ok(());
         }
         let mut values = set.read_f64().map_err(placed)?;
         if values.len() as u64 != count {
-            return Err(Fault::Other(format!("{name:?} holds {} values, not {count}; copy it again", values.len())));
+            return Err(Fault::Other(format!(
+                "{name:?} holds {} values, not {count}; copy it again",
+                values.len()
+            )));
         }
         self.packing(&name, &attributes, &mut values);
         let unit = ["units", "unit", "Units", "Unit"].iter().find_map(|key| text(&attributes, key));
@@ -189,7 +194,9 @@ impl Walk {
         if factor.is_some() || offset.is_some() {
             let (factor, offset) = (factor.unwrap_or(1.0), offset.unwrap_or(0.0));
             values.iter_mut().for_each(|value| *value = *value * factor + offset);
-            said.push(format!("values were multiplied by scale_factor {factor}, and add_offset {offset} was added"));
+            said.push(format!(
+                "values were multiplied by scale_factor {factor}, and add_offset {offset} was added"
+            ));
         }
         self.found.notes.extend(said.into_iter().map(|note| format!("{name}: {note}")));
     }
@@ -202,7 +209,10 @@ fn is_number(set: &Dataset) -> Result<bool, Error> {
     Ok(match dtype {
         F32 | F64 | I8 | I16 | I32 | I64 | U8 | U16 | U32 | U64 => true,
         // Half precision and the like.
-        Other(datatype) => matches!(*datatype, hdf5_pure::Datatype::FloatingPoint { .. } | hdf5_pure::Datatype::FixedPoint { .. }),
+        Other(datatype) => matches!(
+            *datatype,
+            hdf5_pure::Datatype::FloatingPoint { .. } | hdf5_pure::Datatype::FixedPoint { .. }
+        ),
         _ => false,
     })
 }

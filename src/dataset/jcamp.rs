@@ -17,12 +17,19 @@ pub(super) fn read(path: &Path, text: &str, options: &ReadOptions) -> Result<Rea
         let Some((label, value)) = record.split_once('=') else { continue };
         let label: String =
             label.chars().filter(|c| !matches!(c, ' ' | '-' | '/' | '_')).collect::<String>().to_uppercase();
-        if matches!(label.as_str(), "XYDATA" | "XYPOINTS") && (entries.contains_key("XYDATA") || entries.contains_key("XYPOINTS")) {
-            return Err(failed("it holds several spectra: export each into a file of its own, or all as one table of text".to_owned()));
+        if matches!(label.as_str(), "XYDATA" | "XYPOINTS")
+            && (entries.contains_key("XYDATA") || entries.contains_key("XYPOINTS"))
+        {
+            return Err(failed(
+                "it holds several spectra: export each into a file of its own, or all as one table of text"
+                    .to_owned(),
+            ));
         }
         entries.entry(label).or_insert(value);
     }
-    let number = |label: &str| entries.get(label).and_then(|text| text.trim().lines().next()?.trim().parse::<f64>().ok());
+    let number = |label: &str| {
+        entries.get(label).and_then(|text| text.trim().lines().next()?.trim().parse::<f64>().ok())
+    };
     let (x_factor, y_factor) = (number("XFACTOR").unwrap_or(1.0), number("YFACTOR").unwrap_or(1.0));
     let (x, y) = if let Some(data) = entries.get("XYDATA") {
         steps(data, number("FIRSTX"), number("LASTX"), number("NPOINTS"), x_factor).map_err(failed)?
@@ -91,7 +98,9 @@ fn steps(
         checks.push((values.len(), x * factor));
         values.extend_from_slice(line_values);
     }
-    let (Some(first), Some(last)) = (first, last) else { return Err("it has no ##FIRSTX and ##LASTX".to_owned()) };
+    let (Some(first), Some(last)) = (first, last) else {
+        return Err("it has no ##FIRSTX and ##LASTX".to_owned());
+    };
     if count.is_some_and(|count| count != values.len() as f64) || values.len() < 2 {
         return Err(format!("{} values where ##NPOINTS says {}", values.len(), count.unwrap_or(f64::NAN)));
     }
@@ -114,5 +123,8 @@ fn points(data: &str, factor: f64) -> Result<(Vec<f64>, Vec<f64>), String> {
     if all.len() % 2 != 0 || all.is_empty() {
         return Err(format!("{} numbers where pairs are expected", all.len()));
     }
-    Ok((all.chunks_exact(2).map(|pair| pair[0] * factor).collect(), all.chunks_exact(2).map(|pair| pair[1]).collect()))
+    Ok((
+        all.chunks_exact(2).map(|pair| pair[0] * factor).collect(),
+        all.chunks_exact(2).map(|pair| pair[1]).collect(),
+    ))
 }

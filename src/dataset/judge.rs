@@ -76,7 +76,9 @@ fn wavelengths(table: &Table, grid: &Grid) -> Result<(), DatasetError> {
             None => "; choose a grid within them".to_owned(),
         };
         return Err(refused(
-            format!("it was measured from {first} to {last} nm, where no wavelength of the grid {grid} lies{advice}"),
+            format!(
+                "it was measured from {first} to {last} nm, where no wavelength of the grid {grid} lies{advice}"
+            ),
             guess,
         ));
     }
@@ -85,9 +87,42 @@ fn wavelengths(table: &Table, grid: &Grid) -> Result<(), DatasetError> {
 
 /// Numbers by which the field marks values that were not measured, without their signs.
 const MARKERS: [f64; 36] = [
-    9.0, 99.0, 999.0, 9999.0, 99999.0, 999_999.0, 9_999_999.0, 99.9, 999.9, 9999.9, 99999.9, 99.99, 999.99, 9999.99, 888.0,
-    8888.0, 32767.0, 32768.0, 65534.0, 65535.0, 2_147_483_647.0, 2_147_483_648.0, 4_294_967_295.0, 1e10, 1e20, 1e30, 1e33,
-    1e34, 1.23e34, 1e35, 1e36, 9.969_21e36, 1e37, 1e38, 3.402_823_5e38, 1.797_693_134_862_315_7e308,
+    9.0,
+    99.0,
+    999.0,
+    9999.0,
+    99999.0,
+    999_999.0,
+    9_999_999.0,
+    99.9,
+    999.9,
+    9999.9,
+    99999.9,
+    99.99,
+    999.99,
+    9999.99,
+    888.0,
+    8888.0,
+    32767.0,
+    32768.0,
+    65534.0,
+    65535.0,
+    2_147_483_647.0,
+    2_147_483_648.0,
+    4_294_967_295.0,
+    1e10,
+    1e20,
+    1e30,
+    1e33,
+    1e34,
+    1.23e34,
+    1e35,
+    1e36,
+    9.969_21e36,
+    1e37,
+    1e38,
+    3.402_823_5e38,
+    1.797_693_134_862_315_7e308,
 ];
 
 fn is_marker(value: f64) -> bool {
@@ -102,7 +137,11 @@ fn marker(table: &Table, spectrum: usize) -> Result<(), DatasetError> {
     let refused = |band: usize, reason: &str| {
         let value = values[band];
         let like = values.iter().filter(|v| **v == value).count();
-        let times = if like > 1 { format!(", as in {} other places of the spectrum", like - 1) } else { String::new() };
+        let times = if like > 1 {
+            format!(", as in {} other places of the spectrum", like - 1)
+        } else {
+            String::new()
+        };
         DatasetError::Value {
             place: format!("spectrum {} of {}", spectrum + 1, table.name()),
             wavelength: table.wavelengths()[band],
@@ -147,7 +186,8 @@ fn marker(table: &Table, spectrum: usize) -> Result<(), DatasetError> {
             return Err(refused(band, "which lies far outside the other values"));
         }
         // A laser line is as high, but it has a foot.
-        let foot = |near: Option<usize>| near.and_then(|i| values.get(i)).is_some_and(|v| v.abs() * 100.0 > value);
+        let foot =
+            |near: Option<usize>| near.and_then(|i| values.get(i)).is_some_and(|v| v.abs() * 100.0 > value);
         if !foot(band.checked_sub(1)) && !foot(Some(band + 1)) {
             return Err(refused(band, "which lies far outside the other values"));
         }
@@ -177,7 +217,8 @@ fn zeros(table: &Table, grid: &Grid) -> Result<(), DatasetError> {
     let end = measured.partition_point(|&w| w < grid.last()).min(measured.len() - 1);
     let is_on_grid = |w: f64| w >= grid.first() && w <= grid.last();
     let is_dark = |band: usize| (0..table.len()).all(|j| table.spectrum(j)[band] == 0.0);
-    let dark: Vec<usize> = (start..=end).filter(|&band| is_on_grid(measured[band]) && is_dark(band)).collect();
+    let dark: Vec<usize> =
+        (start..=end).filter(|&band| is_on_grid(measured[band]) && is_dark(band)).collect();
     let (Some(&first), Some(&last)) = (dark.first(), dark.last()) else { return Ok(()) };
     if dark.len() == end + 1 - start {
         return Ok(()); // a table of zeros is refused for that
@@ -249,7 +290,8 @@ impl Dataset {
                 return Err(self.unphysical(j, low, reason, Remedy::MissingValue(spectrum[low])));
             }
             if 2 * below > bands {
-                let reason = "and most of its values are below 0, which reflectances are not: remove the spectrum";
+                let reason =
+                    "and most of its values are below 0, which reflectances are not: remove the spectrum";
                 return Err(self.unphysical(j, low, reason, Remedy::None));
             }
             if spectrum[high] == 0.0 && spectrum[low] == 0.0 {
@@ -305,7 +347,19 @@ mod tests {
     #[test]
     fn markers_are_refused_by_place_and_value() {
         for value in [
-            -999.0, -9999.0, -99.0, -1.23e34, 9.96921e36, 65535.0, 32767.0, -32768.0, 999.0, 1e20, -3.4028235e38, -7.5, 5000.0,
+            -999.0,
+            -9999.0,
+            -99.0,
+            -1.23e34,
+            9.96921e36,
+            65535.0,
+            32767.0,
+            -32768.0,
+            999.0,
+            1e20,
+            -3.4028235e38,
+            -7.5,
+            5000.0,
             -1.0,
         ] {
             for spectrum in [0, 9] {
@@ -339,11 +393,17 @@ mod tests {
         let mut spectra = ten();
         spectra[4].iter_mut().for_each(|v| *v *= 100.0);
         let error = data(&spectra).unwrap().judge(SpectrumKind::Reflectance).unwrap_err();
-        assert!(error.place.starts_with("spectrum 5 of t.csv") && error.remedy == Remedy::Scale(0.01), "{error}");
+        assert!(
+            error.place.starts_with("spectrum 5 of t.csv") && error.remedy == Remedy::Scale(0.01),
+            "{error}"
+        );
         let mut spectra = ten();
         spectra[6].iter_mut().for_each(|v| *v *= 0.01);
         let error = data(&spectra).unwrap().judge(SpectrumKind::Reflectance).unwrap_err();
-        assert!(error.to_string().starts_with("spectrum 7 of t.csv") && error.reason.contains("another scale"), "{error}");
+        assert!(
+            error.to_string().starts_with("spectrum 7 of t.csv") && error.reason.contains("another scale"),
+            "{error}"
+        );
         let negative: Vec<_> = ten().iter().map(|s| s.iter().map(|v| -0.1 * v).collect()).collect();
         assert!(data(&negative).unwrap().judge(SpectrumKind::Reflectance).is_err());
         assert!(data(&negative).unwrap().judge(SpectrumKind::Illuminant).is_err());
@@ -357,8 +417,16 @@ mod tests {
         assert!(text.contains("every spectrum is 0 at 3 wavelengths from 400 to 420 nm"), "{text}");
         for (wavelengths, message, remedy) in [
             ((1..=1000).map(f64::from).collect::<Vec<_>>(), "they count from 1 to 1000", Remedy::None),
-            ((0..31).map(|i| 0.4 + 0.01 * f64::from(i)).collect(), "in um?", Remedy::Unit(WavelengthUnit::Um)),
-            ((0..31).map(|i| 4000.0 + 100.0 * f64::from(i)).collect(), "in angstrom", Remedy::Unit(WavelengthUnit::Angstrom)),
+            (
+                (0..31).map(|i| 0.4 + 0.01 * f64::from(i)).collect(),
+                "in um?",
+                Remedy::Unit(WavelengthUnit::Um),
+            ),
+            (
+                (0..31).map(|i| 4000.0 + 100.0 * f64::from(i)).collect(),
+                "in angstrom",
+                Remedy::Unit(WavelengthUnit::Angstrom),
+            ),
         ] {
             let spectra = vec![vec![0.5; wavelengths.len()]; 2];
             let table = Table::new("t.csv", wavelengths, &spectra).unwrap();

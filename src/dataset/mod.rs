@@ -38,12 +38,13 @@ use std::fmt;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Extrapolation, Grid};
+use crate::grid::Grid;
 pub use builtin::BuiltinTable;
 pub use error::{DatasetError, Remedy};
 pub use judge::{SpectraCounts, Unphysical};
 pub use reading::{Decimal, ReadOptions, Reading, Separator, TableLayout};
-use resample::resample;
+pub use resample::{ResampleMethod, Resampling};
+use resample::{Resampled, resample};
 pub use table::Table;
 pub use units::WavelengthUnit;
 
@@ -65,7 +66,8 @@ fn hdf5_bytes(path: &std::path::Path, bytes: Vec<u8>) -> Result<arrays::Arrays, 
 
 #[cfg(not(feature = "hdf5"))]
 fn hdf5_bytes(path: &std::path::Path, _: Vec<u8>) -> Result<arrays::Arrays, DatasetError> {
-    let reason = "this build leaves out HDF5: build it with the feature hdf5, or resave with save(file, '-v7')";
+    let reason =
+        "this build leaves out HDF5: build it with the feature hdf5, or resave with save(file, '-v7')";
     Err(format::not_built(path, "HDF5", reason))
 }
 
@@ -89,6 +91,19 @@ impl fmt::Display for SpectrumKind {
     }
 }
 
+/// Treatment of spectra that lack a value which the grid needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum Missing {
+    /// An error, which names the first of them.
+    #[default]
+    Error,
+    /// They are left out.
+    Drop,
+    /// The value is interpolated between those that were measured. What is missing at an end stays an error.
+    Interpolate,
+}
+
 /// Spectra of one or more sources on one grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
@@ -96,30 +111,55 @@ pub struct Dataset {
     /// One column per spectrum.
     spectra: DMatrix<f64>,
     sources: Vec<String>,
-    /// Number of spectra of each source.
-    counts: Vec<usize>,
+    /// The numbers, from 1, of the spectra of each source in its table.
+    numbers: Vec<Vec<usize>>,
+    notes: Vec<String>,
 }
 
 impl Dataset {
-    /// Judges `tables`, resamples them onto `grid` and joins them, in order. See [`Extrapolation`] for wavelengths
-    /// outside a table's. Values that no measurement gives are an error.
-    pub fn new(tables: &[Table], grid: Grid, extend: Extrapolation) -> Result<Dataset, DatasetError> {
+    /// Judges `tables`, resamples them onto `grid` and joins them, in order, as [`Resampling`] says; an [`Extrapolation`]
+    /// alone stands for settings that are otherwise the defaults. Values that no measurement gives are an error.
+    pub fn new(
+        tables: &[Table],
+        grid: Grid,
+        settings: impl Into<Resampling>,
+    ) -> Result<Dataset, DatasetError> {
+        let settings = settings.into();
         if tables.is_empty() {
             return Err(DatasetError::NoSpectra { name: "an empty list of tables".to_owned() });
         }
         tables.iter().try_for_each(|table| judge::table(table, &grid))?;
-        let columns: Vec<_> = tables.iter().map(|t| resample(t, grid, extend)).collect::<Result<_, _>>()?;
-        let count = columns.iter().map(DMatrix::ncols).sum();
-        let values = columns.iter().flat_map(|c| c.iter().copied());
+        let resampled = tables.iter().map(|table| resample(table, &grid, settings));
+        let resampled = resampled.collect::<Result<Vec<_>, _>>()?;
+        let count = resampled.iter().map(|of| of.numbers.len()).sum();
+        let values = resampled.iter().flat_map(|of| of.spectra.iter().copied());
         let spectra = DMatrix::from_iterator(grid.len(), count, values);
-        let sources = tables.iter().map(|t| format!("{} ({} spectra)", t.source, t.len())).collect();
-        let counts = tables.iter().map(Table::len).collect();
-        Ok(Dataset { grid, spectra, sources, counts })
+        let source =
+            |(table, of): (&Table, &Resampled)| format!("{} ({} spectra)", table.source, of.numbers.len());
+        let sources = tables.iter().zip(&resampled).map(source).collect();
+        let notes = resampled.iter().flat_map(|of| of.notes.iter().cloned()).collect();
+        let numbers = resampled.into_iter().map(|of| of.numbers).collect();
+        Ok(Dataset { grid, spectra, sources, numbers, notes })
+    }
+
+    /// The wavelengths at which these tables were measured, all of them alike, as a grid. Wavelengths at which a table has
+    /// no value at all, as where water absorbs, are left out.
+    pub fn measured_grid(tables: &[Table]) -> Result<Grid, DatasetError> {
+        let [table, others @ ..] = tables else {
+            return Err(DatasetError::NoSpectra { name: "an empty list of tables".to_owned() });
+        };
+        let wavelengths = table.measured_wavelengths();
+        let is_other = |other: &&Table| other.measured_wavelengths() != wavelengths;
+        if let Some(other) = others.iter().find(is_other) {
+            return Err(DatasetError::Grids { a: table.name.clone(), b: other.name.clone() });
+        }
+        Grid::from_wavelengths(&wavelengths)
+            .map_err(|source| DatasetError::Wavelengths { name: table.name.clone(), source })
     }
 
     /// The wavelengths.
-    pub fn grid(&self) -> Grid {
-        self.grid
+    pub fn grid(&self) -> &Grid {
+        &self.grid
     }
 
     /// The spectra: a row per band, a column per spectrum.
@@ -132,14 +172,17 @@ impl Dataset {
         &self.sources
     }
 
+    /// Sentences about what the resampling did beyond interpolation, and why.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// The source of spectrum `index` and its number there, from 1, as messages name it.
     pub(crate) fn place(&self, index: usize) -> String {
-        let mut number = index;
-        let source = self.counts.iter().position(|&count| {
-            let is_here = number < count;
-            number -= if is_here { 0 } else { count };
-            is_here
-        });
-        format!("spectrum {} of {}", number + 1, self.sources[source.expect("the data have that many")])
+        let places = self.numbers.iter().enumerate();
+        let mut places =
+            places.flat_map(|(source, numbers)| numbers.iter().map(move |number| (source, number)));
+        let (source, number) = places.nth(index).expect("the data have that many");
+        format!("spectrum {number} of {}", self.sources[source])
     }
 }

@@ -114,8 +114,9 @@ impl Header {
         }
         let (text, data) = rest.split_at_checked(length).ok_or(cut)?;
         let text = std::str::from_utf8(text).map_err(|_| "its header is no text")?;
-        let header =
-            Header::parse(text).ok_or_else(|| format!("its header is not NumPy's: {}", text.trim().chars().take(60).collect::<String>()))?;
+        let header = Header::parse(text).ok_or_else(|| {
+            format!("its header is not NumPy's: {}", text.trim().chars().take(60).collect::<String>())
+        })?;
         Ok((header, data))
     }
 

@@ -37,7 +37,11 @@ pub(super) fn kind(bytes: &[u8]) -> Archive {
 
 /// Every numeric array of an archive.
 pub(super) fn arrays(path: &Path, bytes: &[u8]) -> Result<Arrays, DatasetError> {
-    let failed = |reason: String| DatasetError::Format { path: path.to_owned(), format: "an archive of NumPy arrays", reason };
+    let failed = |reason: String| DatasetError::Format {
+        path: path.to_owned(),
+        format: "an archive of NumPy arrays",
+        reason,
+    };
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| failed(e.to_string()))?;
     let mut found =
         Arrays { format: "NumPy archive (.npz)".to_owned(), order: Order::LastFirst, ..Arrays::default() };

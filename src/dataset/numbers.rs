@@ -76,7 +76,9 @@ impl Number {
     /// Reads all numbers of these bytes; an incomplete one at the end is left.
     pub(super) fn read_all(self, bytes: &[u8]) -> Vec<f64> {
         match (self.kind, self.bytes, self.big_endian) {
-            (NumberKind::Float, 8, false) => bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect(),
+            (NumberKind::Float, 8, false) => {
+                bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect()
+            }
             (NumberKind::Float, 4, false) => {
                 bytes.as_chunks().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect()
             }

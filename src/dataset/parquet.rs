@@ -42,7 +42,8 @@ pub(super) struct Columns {
 impl Columns {
     /// Adds the rows of a file to those before.
     pub(super) fn add(&mut self, path: &Path, bytes: Vec<u8>) -> Result<(), DatasetError> {
-        let failed = |reason: String| DatasetError::Format { path: path.to_owned(), format: "Parquet", reason };
+        let failed =
+            |reason: String| DatasetError::Format { path: path.to_owned(), format: "Parquet", reason };
         let taken = std::mem::take(self);
         let read = catch_unwind(AssertUnwindSafe(|| taken.with(bytes)));
         *self = read.map_err(|_| failed("it is damaged; copy it again".to_owned()))?.map_err(failed)?;
@@ -83,7 +84,10 @@ impl Columns {
                 self.columns.push(column);
                 continue;
             }
-            let before = self.columns.get_mut(index).filter(|before| before.name == column.name && before.width == column.width);
+            let before = self
+                .columns
+                .get_mut(index)
+                .filter(|before| before.name == column.name && before.width == column.width);
             let before = before.ok_or("its columns differ from those of the file before it")?;
             before.values.append(&mut column.values);
             before.texts.append(&mut column.texts);
@@ -110,7 +114,8 @@ impl Columns {
             return arrays::choose(path, &found, options);
         }
         let mut sheet = Sheet::new("row");
-        let rows = self.columns.iter().map(|column| column.values.len().max(column.texts.len())).max().unwrap_or(0);
+        let rows =
+            self.columns.iter().map(|column| column.values.len().max(column.texts.len())).max().unwrap_or(0);
         sheet.begin_row(0, false);
         self.columns.iter().for_each(|column| sheet.push(Cell::parse(&column.name, Decimal::Point)));
         sheet.end_row().map_err(|e| e.of(path))?;
@@ -155,7 +160,12 @@ fn read_column(
             loop {
                 let mut batch = Vec::new();
                 let (records, _, levels) = reader
-                    .read_records(BATCH, (max_def > 0).then_some(&mut defs), (max_rep > 0).then_some(&mut reps), &mut batch)
+                    .read_records(
+                        BATCH,
+                        (max_def > 0).then_some(&mut defs),
+                        (max_rep > 0).then_some(&mut reps),
+                        &mut batch,
+                    )
                     .map_err(|e| e.to_string())?;
                 for value in &batch {
                     $value(value);
@@ -182,7 +192,8 @@ fn read_column(
             });
         }
         ColumnReader::ByteArrayColumnReader(reader) => {
-            all!(reader, |v: &parquet::data_type::ByteArray| texts.push(String::from_utf8_lossy(v.data()).into_owned()));
+            all!(reader, |v: &parquet::data_type::ByteArray| texts
+                .push(String::from_utf8_lossy(v.data()).into_owned()));
             column.texts.append(&mut texts);
             return Ok(());
         }
@@ -197,7 +208,9 @@ fn read_column(
         0 => values,
         _ => {
             let mut next = values.into_iter();
-            defs.iter().map(|def| if *def == max_def { next.next().unwrap_or(f64::NAN) } else { f64::NAN }).collect()
+            defs.iter()
+                .map(|def| if *def == max_def { next.next().unwrap_or(f64::NAN) } else { f64::NAN })
+                .collect()
         }
     };
     if max_rep > 0 && !all.is_empty() {

@@ -1,7 +1,7 @@
 //! Settings of a reader, and its account of how it read a file.
 
-use super::{BuiltinTable, Table};
 use super::units::WavelengthUnit;
+use super::{BuiltinTable, Table};
 
 /// Settings of a reader, for what a file does not say of itself or says wrongly.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -87,9 +87,9 @@ impl Separator {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Decimal {
-    /// 0.5
+    /// A point, as in 0.5.
     Point,
-    /// 0,5
+    /// A comma, as in 0,5.
     Comma,
 }
 

@@ -12,7 +12,8 @@ use super::{DatasetError, text};
 
 /// Reads a spreadsheet; the array that is asked for is the name of a sheet.
 pub(super) fn read(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Reading, DatasetError> {
-    let failed = |reason: String| DatasetError::Format { path: path.to_owned(), format: "a spreadsheet", reason };
+    let failed =
+        |reason: String| DatasetError::Format { path: path.to_owned(), format: "a spreadsheet", reason };
     let sheets = catch_unwind(AssertUnwindSafe(|| sheets(bytes)));
     let sheets = sheets.map_err(|_| failed("it is damaged; save it again".to_owned()))?.map_err(failed)?;
     let names: Vec<String> = sheets.iter().map(|(name, _)| name.clone()).collect();
@@ -49,7 +50,11 @@ fn sheets(bytes: &[u8]) -> Result<Vec<(String, Range<Data>)>, String> {
     let names = book.sheet_names();
     names
         .into_iter()
-        .map(|name| book.worksheet_range(&name).map(|range| (name.clone(), range)).map_err(|e| format!("{name:?}: {e}")))
+        .map(|name| {
+            book.worksheet_range(&name)
+                .map(|range| (name.clone(), range))
+                .map_err(|e| format!("{name:?}: {e}"))
+        })
         .collect()
 }
 

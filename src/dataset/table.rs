@@ -147,21 +147,6 @@ impl Table {
         self.spectra.iter().filter(|v| v.is_nan()).count()
     }
 
-    /// Leaves out the spectra that lack a value that a grid from `first` to `last` (nm) needs: within it, or next to an end
-    /// that was not measured. Also returns how many they are.
-    pub fn without_missing(mut self, first: f64, last: f64) -> Result<(Table, usize), DatasetError> {
-        let start = self.wavelengths.partition_point(|&w| w <= first).saturating_sub(1);
-        let end = self.wavelengths.partition_point(|&w| w < last).min(self.wavelengths.len() - 1);
-        let lacks =
-            |j: &usize| (start..=end.max(start)).any(|i| self.spectra[(i, *j)].is_nan());
-        let gone: Vec<usize> = (0..self.spectra.ncols()).filter(lacks).collect();
-        if gone.len() == self.spectra.ncols() {
-            return Err(DatasetError::NoneLeft { name: self.name, first, last });
-        }
-        self.spectra = self.spectra.remove_columns_at(&gone);
-        Ok((self, gone.len()))
-    }
-
     /// Name of the table in messages.
     pub fn name(&self) -> &str {
         &self.name
@@ -176,6 +161,12 @@ impl Table {
     /// The wavelengths of the measurements, nm.
     pub fn wavelengths(&self) -> &[f64] {
         &self.wavelengths
+    }
+
+    /// The wavelengths at which any spectrum has a value, nm.
+    pub(super) fn measured_wavelengths(&self) -> Vec<f64> {
+        let rows = self.spectra.row_iter().zip(&self.wavelengths);
+        rows.filter(|(row, _)| row.iter().any(|value| !value.is_nan())).map(|(_, &w)| w).collect()
     }
 
     /// The number of spectra.

@@ -46,14 +46,21 @@ impl WavelengthUnit {
     /// The unit that a text names, as in "Wavelength (nm)", "Micrometers" or "cm^-1".
     pub(super) fn named_in(text: &str) -> Option<WavelengthUnit> {
         let lower = text.to_lowercase().replace('μ', "µ");
-        if ["cm-1", "cm^-1", "cm⁻¹", "1/cm", "wavenumber", "cm**-1", "wellenzahl"].iter().any(|w| lower.contains(w)) {
+        if ["cm-1", "cm^-1", "cm⁻¹", "1/cm", "wavenumber", "cm**-1", "wellenzahl"]
+            .iter()
+            .any(|w| lower.contains(w))
+        {
             return Some(WavelengthUnit::PerCm);
         }
         let is_word = |word: &str| words(&lower).any(|found| found == word);
-        if ["nm", "nanometer", "nanometers", "nanometre", "nanometres", "nanomètres"].iter().any(|w| is_word(w)) {
+        if ["nm", "nanometer", "nanometers", "nanometre", "nanometres", "nanomètres"]
+            .iter()
+            .any(|w| is_word(w))
+        {
             return Some(WavelengthUnit::Nm);
         }
-        let micro = ["um", "µm", "micrometer", "micrometers", "micrometre", "micrometres", "micron", "microns"];
+        let micro =
+            ["um", "µm", "micrometer", "micrometers", "micrometre", "micrometres", "micron", "microns"];
         if micro.iter().any(|w| is_word(w)) {
             return Some(WavelengthUnit::Um);
         }
@@ -96,9 +103,36 @@ pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
 /// Whether a heading is one of wavelengths.
 pub(super) fn is_wavelength_word(text: &str) -> bool {
     const WORDS: [&str; 30] = [
-        "wavelength", "wavelengths", "wavelen", "wl", "wls", "wvl", "wvls", "wave", "waves", "lambda", "lambdas", "λ", "lam",
-        "nm", "nanometer", "nanometers", "nanometre", "nanometres", "wavenumber", "wavenumbers", "wellenlänge",
-        "wellenlaenge", "wellenzahl", "onda", "onde", "golflengte", "um", "µm", "micrometers", "angstrom",
+        "wavelength",
+        "wavelengths",
+        "wavelen",
+        "wl",
+        "wls",
+        "wvl",
+        "wvls",
+        "wave",
+        "waves",
+        "lambda",
+        "lambdas",
+        "λ",
+        "lam",
+        "nm",
+        "nanometer",
+        "nanometers",
+        "nanometre",
+        "nanometres",
+        "wavenumber",
+        "wavenumbers",
+        "wellenlänge",
+        "wellenlaenge",
+        "wellenzahl",
+        "onda",
+        "onde",
+        "golflengte",
+        "um",
+        "µm",
+        "micrometers",
+        "angstrom",
     ];
     let lower = text.to_lowercase().replace('μ', "µ");
     words(&lower).any(|word| WORDS.contains(&word))
@@ -107,9 +141,9 @@ pub(super) fn is_wavelength_word(text: &str) -> bool {
 /// Whether a heading is one of names or numbers of samples.
 pub(super) fn is_id_word(text: &str) -> bool {
     const WORDS: [&str; 26] = [
-        "id", "ids", "sample", "samples", "sampleid", "name", "names", "spectrum", "spectra", "no", "nr", "num", "number",
-        "index", "idx", "label", "labels", "specimen", "scan", "file", "filename", "title", "material", "class", "patch",
-        "probe",
+        "id", "ids", "sample", "samples", "sampleid", "name", "names", "spectrum", "spectra", "no", "nr",
+        "num", "number", "index", "idx", "label", "labels", "specimen", "scan", "file", "filename", "title",
+        "material", "class", "patch", "probe",
     ];
     let lower = text.to_lowercase();
     lower.trim() == "#" || words(&lower).any(|word| WORDS.contains(&word))
@@ -136,7 +170,9 @@ mod tests {
         ] {
             assert_eq!(WavelengthUnit::named_in(text), unit, "{text}");
         }
-        assert!(is_wavelength_word("Wavelength [nm]") && is_wavelength_word("λ") && !is_wavelength_word("sample"));
+        assert!(
+            is_wavelength_word("Wavelength [nm]") && is_wavelength_word("λ") && !is_wavelength_word("sample")
+        );
         assert!(is_id_word("Sample_ID") && is_id_word("#") && !is_id_word("wavelength"));
     }
 

@@ -165,7 +165,8 @@ impl Layout {
                 other => return Err(unknown(other)),
             }
         }
-        let Some(number) = node["data_type"].as_str().and_then(|name| Number::spelled(name, big_endian)) else {
+        let Some(number) = node["data_type"].as_str().and_then(|name| Number::spelled(name, big_endian))
+        else {
             return Ok(None);
         };
         let encoding = &node["chunk_key_encoding"];
@@ -224,7 +225,8 @@ impl Layout {
         let unit = attributes["units"].as_str().or(attributes["unit"].as_str());
         self.unit = unit.and_then(WavelengthUnit::named_in);
         self.scale = ["scale_factor", "add_offset"].map(|key| attributes[key].as_f64());
-        self.missing = ["_FillValue", "missing_value"].iter().filter_map(|key| attributes[*key].as_f64()).collect();
+        self.missing =
+            ["_FillValue", "missing_value"].iter().filter_map(|key| attributes[*key].as_f64()).collect();
         self
     }
 
@@ -235,7 +237,9 @@ impl Layout {
         if !is_sound {
             return match self.shape.is_empty() {
                 true => Ok(None), // a single number
-                false => Err(format!("its shape {:?} and its chunks {:?} do not fit", self.shape, self.chunk)),
+                false => {
+                    Err(format!("its shape {:?} and its chunks {:?} do not fit", self.shape, self.chunk))
+                }
             };
         }
         let bytes = self.chunk.iter().try_fold(self.number.bytes, |product, side| product.checked_mul(*side));
@@ -247,11 +251,16 @@ impl Layout {
 
     fn read(&self, folder: &Path, name: &str, left: &mut usize) -> Result<Array, Fault> {
         let count = self.shape.iter().try_fold(1usize, |product, side| product.checked_mul(*side));
-        let count = count.filter(|count| *count <= *left).ok_or_else(|| super::too_many(count.unwrap_or(usize::MAX)))?;
-        let grid: Vec<usize> = self.shape.iter().zip(&self.chunk).map(|(side, chunk)| side.div_ceil(*chunk)).collect();
+        let count = count
+            .filter(|count| *count <= *left)
+            .ok_or_else(|| super::too_many(count.unwrap_or(usize::MAX)))?;
+        let grid: Vec<usize> =
+            self.shape.iter().zip(&self.chunk).map(|(side, chunk)| side.div_ceil(*chunk)).collect();
         let chunks = grid.iter().try_fold(1usize, |product, side| product.checked_mul(*side));
         if chunks.is_none_or(|chunks| chunks > MAX_CHUNKS) {
-            return Err(Fault::Reason("it has more chunks than are read: write it in larger ones".to_owned()));
+            return Err(Fault::Reason(
+                "it has more chunks than are read: write it in larger ones".to_owned(),
+            ));
         }
         *left -= count;
         // An array of fill alone is no measurement, and takes no file.
@@ -275,7 +284,10 @@ impl Layout {
         }
         let missing = chunks.unwrap_or(0) - present;
         if missing > 0 && count > 0 {
-            return Err(Fault::Reason(format!("{missing} of its {} chunks are not there; copy it again", present + missing)));
+            return Err(Fault::Reason(format!(
+                "{missing} of its {} chunks are not there; copy it again",
+                present + missing
+            )));
         }
         for value in &mut values {
             if self.missing.contains(value) {
@@ -309,14 +321,22 @@ impl Layout {
                 bytes = packed;
                 Ok(0)
             }
-            Packing::Gzip => flate2::read::GzDecoder::new(packed.as_slice()).take(cap).read_to_end(&mut bytes),
-            Packing::Zlib => flate2::read::ZlibDecoder::new(packed.as_slice()).take(cap).read_to_end(&mut bytes),
+            Packing::Gzip => {
+                flate2::read::GzDecoder::new(packed.as_slice()).take(cap).read_to_end(&mut bytes)
+            }
+            Packing::Zlib => {
+                flate2::read::ZlibDecoder::new(packed.as_slice()).take(cap).read_to_end(&mut bytes)
+            }
             Packing::Zstd => unzstd(&packed, cap, &mut bytes),
         };
         let name = || path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         unpacked.map_err(|e| format!("chunk {} is damaged ({e}); copy it again", name()))?;
         if bytes.len() != size {
-            return Err(Fault::Reason(format!("chunk {} has {} bytes, not {size}; copy it again", name(), bytes.len())));
+            return Err(Fault::Reason(format!(
+                "chunk {} has {} bytes, not {size}; copy it again",
+                name(),
+                bytes.len()
+            )));
         }
         Ok(self.number.read_all(&bytes))
     }
@@ -331,7 +351,8 @@ impl Layout {
         let last = self.chunk[sides - 1];
         let mut index = vec![0; sides];
         for row in chunk.chunks_exact(last) {
-            let start: Vec<usize> = (0..sides).map(|side| at[side] * self.chunk[side] + index[side]).collect();
+            let start: Vec<usize> =
+                (0..sides).map(|side| at[side] * self.chunk[side] + index[side]).collect();
             if (0..sides - 1).all(|side| start[side] < self.shape[side]) {
                 let offset = (0..sides).fold(0, |offset, side| offset * self.shape[side] + start[side]);
                 let length = last.min(self.shape[sides - 1] - start[sides - 1]);

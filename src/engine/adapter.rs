@@ -68,7 +68,7 @@ pub(super) fn compiled() -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// What to do where no adapter was found.
+/// Remedy where no adapter was found.
 pub(super) fn remedy() -> String {
     match variable(BACKEND) {
         Some(value) => format!("the variable {BACKEND} is {value:?} and hides all others, unset it"),

@@ -108,8 +108,8 @@ impl Comparison {
         let observer = match model.kind() {
             SpectrumKind::Reflectance => colorimetry::xyz_weights(model.grid()),
             SpectrumKind::Illuminant => {
-                let cmf = colorimetry::cmf(model.grid());
-                cmf.iter().flatten().any(|&v| v > 0.0).then_some(cmf)
+                let weights = colorimetry::emitted_xyz_weights(model.grid());
+                weights.iter().flatten().any(|&v| v > 0.0).then_some(weights)
             }
         };
         Ok(Comparison {
@@ -219,7 +219,7 @@ mod tests {
     fn surfaces() -> (Model, Dataset) {
         let model = Model::builtin("munsell-vrhel").unwrap();
         let tables = [BuiltinTable::Munsell.table(), BuiltinTable::Vrhel.table()];
-        let data = Dataset::new(&tables, model.grid(), Extrapolation::Error).unwrap();
+        let data = Dataset::new(&tables, model.grid().clone(), Extrapolation::Error).unwrap();
         (model, data)
     }
 
@@ -245,7 +245,7 @@ mod tests {
         let spectra: Vec<_> =
             (0..2000).map(|i| recipe.draw::<f64>(Stream::new(1), i).spectrum().to_vec()).collect();
         let table = Table::new("draws", model.grid().wavelengths().collect(), &spectra).unwrap();
-        let data = Dataset::new(&[table], model.grid(), Extrapolation::Error).unwrap();
+        let data = Dataset::new(&[table], model.grid().clone(), Extrapolation::Error).unwrap();
         let figures = Comparison::new(&recipe, &data, Stream::new(0), 20_000).unwrap().figures();
         // Six weights at a false alarm rate of 1e-6 each; a mean has the standard error 0.0235, of which 5 are 0.12.
         for weight in &figures.weights {
@@ -261,7 +261,7 @@ mod tests {
             (0..31).map(|band| low + (high - low) * f64::from(band) / 30.0).collect::<Vec<_>>()
         });
         let table = Table::new("three", model.grid().wavelengths().collect(), &spectra).unwrap();
-        let data = Dataset::new(&[table], model.grid(), Extrapolation::Error).unwrap();
+        let data = Dataset::new(&[table], model.grid().clone(), Extrapolation::Error).unwrap();
         let plain = Recipe::builder(&model).build().unwrap();
         let bright = Recipe::builder(&model).intensity(crate::Intensity::Fixed(100.0)).build().unwrap();
         let compare = |recipe| Comparison::new(recipe, &data, Stream::new(0), 50).unwrap();

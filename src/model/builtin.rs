@@ -1,8 +1,8 @@
 //! The models that are built in, and the data that they are fitted to.
 
 use super::{Fit, Model, ModelError};
-use crate::dataset::{BuiltinTable, Dataset, SpectrumKind, Table};
-use crate::grid::{Extrapolation, Grid};
+use crate::dataset::{BuiltinTable, Dataset, ResampleMethod, Resampling, SpectrumKind, Table};
+use crate::grid::Grid;
 
 /// The measurements behind a built-in model, which [`Model::builtin_at`] fits at the wavelengths that are asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +18,8 @@ pub struct BuiltinData {
     pub last: f64,
     /// The step at which all of them were measured, nm; a finer grid is interpolated.
     pub step: f64,
+    /// The tables that hold them.
+    pub tables: &'static [BuiltinTable],
 }
 
 /// A family of built-in models: the same data at different wavelengths.
@@ -26,12 +28,19 @@ struct Family {
     tables: &'static [BuiltinTable],
     /// Models that were fitted once: a fit made now could differ in its last digits, and so would every draw of it.
     fitted: &'static [(&'static str, &'static str)],
+    /// The grid of the model unless another is asked for.
+    grid: &'static str,
+    /// Averages of data where they are finer than a grid would change the draws of the models that came first; lamps with
+    /// lines need them.
+    method: ResampleMethod,
 }
 
 const MUNSELL_VRHEL: Family = Family {
     kind: SpectrumKind::Reflectance,
     tables: &[BuiltinTable::Munsell, BuiltinTable::Vrhel],
     fitted: &[],
+    grid: "400:10:700",
+    method: ResampleMethod::Interpolate,
 };
 
 const GRANADA: Family = Family {
@@ -41,14 +50,39 @@ const GRANADA: Family = Family {
         ("400:10:700", include_str!("../../data/granada.json")),
         ("400:5:700", include_str!("../../data/granada-5nm.json")),
     ],
+    grid: "400:10:700",
+    method: ResampleMethod::Interpolate,
+};
+
+const MACBETH: Family = Family { tables: &[BuiltinTable::Macbeth], ..MUNSELL_VRHEL };
+
+const KOIVISTO: Family = Family { tables: &[BuiltinTable::Koivisto], ..MUNSELL_VRHEL };
+
+const KRINOV: Family = Family { tables: &[BuiltinTable::Krinov], grid: "400:10:650", ..MUNSELL_VRHEL };
+
+const HOUSER: Family = Family {
+    kind: SpectrumKind::Illuminant,
+    tables: &[BuiltinTable::Houser],
+    method: ResampleMethod::Average,
+    ..MUNSELL_VRHEL
 };
 
 impl Model {
-    /// The names of the built-in models. `-5nm` is the grid 400:5:700, the others are at 400:10:700.
-    pub const BUILTIN: &[&str] = &["munsell-vrhel", "granada", "munsell-vrhel-5nm", "granada-5nm"];
+    /// The names of the built-in models. `-5nm` is the grid 400:5:700, `krinov` is at 400:10:650 and the others are at
+    /// 400:10:700.
+    pub const BUILTIN: &[&str] = &[
+        "munsell-vrhel",
+        "granada",
+        "munsell-vrhel-5nm",
+        "granada-5nm",
+        "macbeth",
+        "koivisto",
+        "krinov",
+        "houser",
+    ];
 
-    /// A built-in model: `munsell-vrhel` (reflectances, fitted here to the compiled-in tables) or `granada`
-    /// (daylights, fitted once to the measurements of Hernández-Andrés et al. 2001), with or without `-5nm`.
+    /// A built-in model: `granada` (daylights, with or without `-5nm`) was fitted once to the measurements of
+    /// Hernández-Andrés et al. 2001; the others are fitted here to the compiled-in tables ([`BuiltinTable`]).
     pub fn builtin(name: &str) -> Result<Model, ModelError> {
         let (family, grid) = family(name)?;
         family.at(name, grid)
@@ -60,8 +94,8 @@ impl Model {
     ///
     /// ```
     /// let grid: spectroll::Grid = "380:5:780".parse()?;
-    /// let daylights = spectroll::Model::builtin_at("granada", grid)?;
-    /// assert_eq!((daylights.grid(), daylights.components()), (grid, 6));
+    /// let daylights = spectroll::Model::builtin_at("granada", grid.clone())?;
+    /// assert_eq!((daylights.grid(), daylights.components()), (&grid, 6));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn builtin_at(name: &str, grid: Grid) -> Result<Model, ModelError> {
@@ -77,26 +111,38 @@ impl Model {
 
 /// The family of a name, and the grid that the name stands for.
 fn family(name: &str) -> Result<(Family, Grid), ModelError> {
-    let fine = Grid::new(400.0, 5.0, 61)?;
-    match name {
-        "munsell-vrhel" => Ok((MUNSELL_VRHEL, Grid::DEFAULT)),
-        "munsell-vrhel-5nm" => Ok((MUNSELL_VRHEL, fine)),
-        "granada" => Ok((GRANADA, Grid::DEFAULT)),
-        "granada-5nm" => Ok((GRANADA, fine)),
-        _ => Err(ModelError::NoBuiltin { name: name.to_owned() }),
-    }
+    let (family, suffix) = match name.strip_suffix("-5nm") {
+        Some(family) => (family, true),
+        None => (name, false),
+    };
+    let found = match (family, suffix) {
+        ("munsell-vrhel", _) => MUNSELL_VRHEL,
+        ("granada", _) => GRANADA,
+        ("macbeth", false) => MACBETH,
+        ("koivisto", false) => KOIVISTO,
+        ("krinov", false) => KRINOV,
+        ("houser", false) => HOUSER,
+        _ => return Err(ModelError::NoBuiltin { name: name.to_owned() }),
+    };
+    let grid = if suffix { "400:5:700" } else { found.grid };
+    Ok((found, grid.parse()?))
 }
 
 impl Family {
     fn at(&self, name: &str, grid: Grid) -> Result<Model, ModelError> {
-        if let Some((_, text)) = self.fitted.iter().find(|(fitted, _)| fitted.parse() == Ok(grid)) {
+        if let Some((_, text)) = self.fitted.iter().find(|(fitted, _)| fitted.parse().as_ref() == Ok(&grid)) {
             return Model::from_json(name, text);
         }
         let tables = self.tables();
         let BuiltinData { first, last, .. } = self.data(&tables);
         let name = || name.to_owned();
-        let data = Dataset::new(&tables, grid, Extrapolation::Error)
-            .map_err(|_| ModelError::BuiltinRange { name: name(), first, last, grid })?;
+        let settings = Resampling::default().method(self.method);
+        let data = Dataset::new(&tables, grid.clone(), settings).map_err(|_| ModelError::BuiltinRange {
+            name: name(),
+            first,
+            last,
+            grid: grid.clone(),
+        })?;
         let fit = Fit::new(self.kind).fit(&data);
         fit.map_err(|source| ModelError::BuiltinFit { name: name(), grid, source })
     }
@@ -111,6 +157,7 @@ impl Family {
         };
         BuiltinData {
             kind: self.kind,
+            tables: self.tables,
             spectra: tables.iter().map(Table::len).sum(),
             first: most(&|wavelengths| wavelengths[0]),
             last: -most(&|wavelengths| -wavelengths[wavelengths.len() - 1]),

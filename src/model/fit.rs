@@ -105,7 +105,10 @@ impl Fit {
         }
         let (mut centred, powers) = self.normalization.divide(data)?;
         let mean = centred.mean();
-        if self.kind == SpectrumKind::Reflectance && mean.is_finite() && mean > 1.0 {
+        // Where only some are, they are named.
+        let percents = centred.column_iter().filter(|spectrum| spectrum.mean() > 1.0).count();
+        let are_percents = 2 * percents > centred.ncols();
+        if self.kind == SpectrumKind::Reflectance && are_percents && mean.is_finite() && mean > 1.0 {
             return Err(FitError::NotReflectances { mean });
         }
         if centred.iter().all(|v| v.is_finite()) {
@@ -153,7 +156,7 @@ impl Fit {
         let variances = singular.rows(0, k).map(|s| s * s / spectra as f64);
         Ok(Model::new(ModelParts {
             kind: self.kind,
-            grid: data.grid(),
+            grid: data.grid().clone(),
             mean,
             basis: basis.rows(0, k).into_owned(),
             weight_mean: DVector::zeros(k),
@@ -189,12 +192,15 @@ impl Normalization {
     }
 
     /// Divisor of a spectrum on this grid: 1 for [`None`](Normalization::None).
-    pub fn divisor(self, spectrum: &[f64], grid: Grid) -> f64 {
+    pub fn divisor(self, spectrum: &[f64], grid: &Grid) -> f64 {
         let spectrum = DVectorView::from_slice(spectrum, spectrum.len());
         match self {
             Normalization::None => 1.0,
             Normalization::Mean => spectrum.mean(),
-            Normalization::Integral => spectrum.sum() * grid.step(),
+            Normalization::Integral => match grid.step() {
+                Some(step) => spectrum.sum() * step,
+                None => spectrum.iter().zip(grid.widths()).map(|(value, width)| value * width).sum(),
+            },
         }
     }
 }
@@ -304,7 +310,8 @@ mod tests {
                 Dataset::new(&[table], Grid::new(400.0, 10.0, 4).unwrap(), Extrapolation::Error).unwrap();
             let fit =
                 Fit::new(SpectrumKind::Reflectance).components(2).normalization(normalization).fit(&data);
-            let expected = matches!(fit, Err(FitError::Scale | FitError::Power { .. } | FitError::Unphysical(_)));
+            let expected =
+                matches!(fit, Err(FitError::Scale | FitError::Power { .. } | FitError::Unphysical(_)));
             assert!(expected, "{size:e}: {fit:?}");
         }
     }

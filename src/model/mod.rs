@@ -47,6 +47,7 @@ pub enum Normalization {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     parts: ModelParts,
+    basis_correction: Option<f64>,
 }
 
 /// Parts of a model; [`Model::new`] checks them.
@@ -58,7 +59,8 @@ pub struct ModelParts {
     pub grid: Grid,
     /// The mean spectrum, n values.
     pub mean: DVector<f64>,
-    /// k orthonormal rows of n values.
+    /// k orthonormal rows of n values. Rows that are orthonormal to 1e-5, as single precision leaves them, are made so in
+    /// double precision.
     pub basis: DMatrix<f64>,
     /// The mean of the weights, k values.
     pub weight_mean: DVector<f64>,
@@ -100,7 +102,7 @@ pub enum ModelError {
     )]
     Components { components: usize, bands: usize },
     #[error(
-        "basis vectors {row} and {column} have the product {product} where an orthonormal basis has {expected} (to 1e-9)"
+        "basis vectors {row} and {column} have the product {product} where an orthonormal basis has {expected} (to 1e-5)"
     )]
     NotOrthonormal { row: usize, column: usize, product: f64, expected: f64 },
     #[error("powers holds {0}; what spectra are divided by is finite and above 0")]
@@ -155,18 +157,18 @@ impl Model {
         let mut explained = 0.0;
         for &share in &parts.explained_variance {
             explained += share;
-            if share < 0.0 || explained > 1.0 + 1e-9 {
+            if share < 0.0 || explained > 1.0 + 1e-5 {
                 return Err(ModelError::ExplainedVariance(share));
             }
         }
         if let Some(&value) = parts.powers.iter().find(|power| !(power.is_finite() && **power > 0.0)) {
             return Err(ModelError::Power(value));
         }
-        check_orthonormal(&parts.basis)?;
+        let basis_correction = orthonormalise(&mut parts.basis)?;
         check_covariance(&parts.weight_covariance)?;
         // Halves that agree to rounding are made to agree exactly, so that a factor of either is the same.
         parts.weight_covariance = &parts.weight_covariance / 2.0 + parts.weight_covariance.transpose() / 2.0;
-        Ok(Model { parts })
+        Ok(Model { parts, basis_correction })
     }
 
     /// Reads a model file.
@@ -204,14 +206,20 @@ impl Model {
         &self.parts
     }
 
+    /// The largest error of a product of two vectors of the basis that was given, where that was changed into the nearest
+    /// orthonormal one; `None` where it was taken as it was.
+    pub fn basis_correction(&self) -> Option<f64> {
+        self.basis_correction
+    }
+
     /// Kind of the spectra.
     pub fn kind(&self) -> SpectrumKind {
         self.parts.kind
     }
 
     /// The wavelengths.
-    pub fn grid(&self) -> Grid {
-        self.parts.grid
+    pub fn grid(&self) -> &Grid {
+        &self.parts.grid
     }
 
     /// The number of wavelengths, n.
@@ -264,15 +272,32 @@ fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
     matrix.row_iter().enumerate().all(|(i, row)| row.iter().enumerate().all(|(j, &v)| i == j || v == 0.0))
 }
 
-fn check_orthonormal(basis: &DMatrix<f64>) -> Result<(), ModelError> {
-    let products = basis * basis.transpose();
+/// The error of products of basis vectors up to which they are taken as they are.
+const ORTHONORMAL: f64 = 1e-9;
+
+/// The error up to which they are made orthonormal: what principal components in single precision have.
+const NEARLY_ORTHONORMAL: f64 = 1e-5;
+
+/// Makes nearly orthonormal rows so, and returns their error where it did: the nearest orthonormal rows are the square
+/// root of the inverse of their products times them (Löwdin 1950).
+fn orthonormalise(basis: &mut DMatrix<f64>) -> Result<Option<f64>, ModelError> {
+    let products = &*basis * basis.transpose();
+    let mut largest = 0f64;
     for (row, column) in (0..basis.nrows()).flat_map(|i| (0..=i).map(move |j| (i, j))) {
         let (product, expected) = (products[(row, column)], f64::from(row == column));
-        if (product - expected).abs() > 1e-9 {
+        let error = (product - expected).abs();
+        if error > NEARLY_ORTHONORMAL {
             return Err(ModelError::NotOrthonormal { row: row + 1, column: column + 1, product, expected });
         }
+        largest = largest.max(error);
     }
-    Ok(())
+    if largest <= ORTHONORMAL {
+        return Ok(None);
+    }
+    let eigen = SymmetricEigen::new(products);
+    let roots = DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| value.sqrt().recip()));
+    *basis = &eigen.eigenvectors * roots * eigen.eigenvectors.transpose() * &*basis;
+    Ok(Some(largest))
 }
 
 /// Symmetric and positive semi-definite, to rounding: 1e-9 of the largest entry or eigenvalue.

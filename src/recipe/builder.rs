@@ -309,7 +309,7 @@ impl RecipeBuilder {
     /// The program without a target, and the map of its tristimulus values under D65.
     fn seen(&self, weights: &Affine) -> Result<(Program, Affine), RecipeError> {
         let grid = self.model.grid();
-        let seen = colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+        let seen = colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid.clone()))?;
         let program = Program::new(&self.model, weights);
         let xyz = program.spectrum.project(&seen);
         Ok((program, xyz))
@@ -372,7 +372,7 @@ impl RecipeBuilder {
             return Err(RecipeError::LrvOfIlluminant);
         }
         let grid = self.model.grid();
-        let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+        let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid.clone()))?;
         Ok(LrvTarget { lrv, weights, bounds: self.bounds.unwrap_or_default() })
     }
 }

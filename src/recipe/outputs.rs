@@ -108,7 +108,7 @@ fn source(
         }
         Quantity::Chromaticity => {
             let grid = model.grid();
-            colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+            colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid.clone()))?;
             let xyz = program.spectrum.project(&xyz_weights(asked, model)?);
             let sum = xyz.project(&[[1.0; 3]]);
             Source::Map(xyz.project(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), Unit::Over(sum))
@@ -123,7 +123,7 @@ fn source(
             },
             (None, _) => {
                 let grid = model.grid();
-                let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid))?;
+                let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid.clone()))?;
                 Source::Map(program.spectrum.project(&[weights]), Unit::One)
             }
         },
@@ -140,10 +140,10 @@ fn source(
 fn xyz_weights(asked: &OutputRequest, model: &Model) -> Result<[Vec<f64>; 3], RecipeError> {
     let grid = model.grid();
     if model.kind() == SpectrumKind::Illuminant {
-        return Ok(colorimetry::cmf(grid).map(|f| f.iter().map(|v| v * grid.step()).collect()));
+        return Ok(colorimetry::emitted_xyz_weights(grid));
     }
     let power = match asked.illuminant.as_ref().unwrap_or(&Illuminant::D65) {
-        Illuminant::D65 => return colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid)),
+        Illuminant::D65 => return colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid.clone())),
         Illuminant::A => colorimetry::illuminant_a(grid),
         Illuminant::E => vec![1.0; grid.len()],
         Illuminant::Power(power) => power.clone(),

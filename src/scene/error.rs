@@ -81,7 +81,7 @@ pub enum SceneErrorKind {
     Model(ModelError),
     #[error("this model is of {found}s, and the group is of {wanted}s: choose another model")]
     Kind { found: SpectrumKind, wanted: SpectrumKind },
-    #[error("the model is on {model} nm, and the scene on {scene} nm: {}", same_grid(*model))]
+    #[error("the model is on {model} nm, and the scene on {scene} nm: {}", same_grid(model))]
     Grid { model: Grid, scene: Grid },
     #[error(transparent)]
     Wavelengths(GridError),
@@ -202,7 +202,10 @@ fn quantities() -> String {
     QUANTITIES.map(Quantity::name).join(", ")
 }
 
-fn same_grid(model: Grid) -> String {
+fn same_grid(model: &Grid) -> String {
+    if model.to_string().parse().as_ref() != Ok(model) {
+        return "leave out wavelengths, or name a model on the scene's".to_owned();
+    }
     format!(
         "set wavelengths = \"{model}\", or name a model on the scene's (some built-in ones end in -5nm; \
          others can be fitted)"

@@ -156,8 +156,12 @@ impl Reader<'_> {
             builder = builder.seed(entry.whole()?);
         }
         if let Some(entry) = section.get("wavelengths") {
-            let grid = entry.text()?.parse().map_err(|e| entry.wrong(SceneErrorKind::Wavelengths(e)))?;
-            builder = builder.wavelengths(grid);
+            let grid = match entry.list() {
+                Some(list) => Grid::from_wavelengths(&list?),
+                None => entry.text()?.parse(),
+            };
+            let grid = grid.map_err(|e| entry.wrong(SceneErrorKind::Wavelengths(e)))?;
+            builder = builder.wavelengths(grid.clone());
             self.wavelengths = Some(grid);
         }
         let mut groups = Vec::new();
@@ -268,7 +272,9 @@ impl Reader<'_> {
         }
         let path = self.folder.join(name);
         let model = if Model::BUILTIN.contains(&name) {
-            self.wavelengths.map_or_else(|| Model::builtin(name), |grid| Model::builtin_at(name, grid))
+            self.wavelengths
+                .clone()
+                .map_or_else(|| Model::builtin(name), |grid| Model::builtin_at(name, grid))
         } else if path.is_file() {
             Model::load(&path)
         } else {
@@ -290,7 +296,7 @@ impl Reader<'_> {
         };
         let wrong = |e: DatasetError| entry.wrong(SceneErrorKind::Mean(e));
         let tables = [table.map_err(wrong)?];
-        let data = Dataset::new(&tables, grid, Extrapolation::Error).map_err(wrong)?;
+        let data = Dataset::new(&tables, grid.clone(), Extrapolation::Error).map_err(wrong)?;
         let found = data.spectra().ncols();
         if found != 1 {
             return Err(entry.wrong(SceneErrorKind::Means { found }));

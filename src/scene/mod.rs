@@ -100,8 +100,8 @@ impl Scene {
     }
 
     /// The wavelengths.
-    pub fn grid(&self) -> Grid {
-        self.grid
+    pub fn grid(&self) -> &Grid {
+        &self.grid
     }
 
     /// The names of the groups.
@@ -204,14 +204,14 @@ impl SceneBuilder {
         if draws > MAX_DRAWS {
             return Err(Fault::of_scene("scenes", SceneErrorKind::Draws { draws }));
         }
-        let grid = self.wavelengths.or_else(|| {
+        let grid = self.wavelengths.clone().or_else(|| {
             let mut models = self.groups.iter().filter_map(|group| group.base().model.as_ref());
-            models.next().map(|model| model.grid())
+            models.next().map(|model| model.grid().clone())
         });
         let grid = grid.unwrap_or(Grid::DEFAULT);
         let plans = self.groups.iter().enumerate();
         let plans: Vec<_> =
-            plans.map(|(i, group)| GroupPlan::new(i, group, grid, self.seed)).collect::<Result<_, _>>()?;
+            plans.map(|(i, group)| GroupPlan::new(i, group, &grid, self.seed)).collect::<Result<_, _>>()?;
         let names = |plan: &'_ GroupPlan| plan.arrays.iter().map(|a| a.name.clone()).collect::<Vec<_>>();
         for (number, plan) in plans.iter().enumerate() {
             let clash =

@@ -150,7 +150,7 @@ impl Varying {
 
 impl GroupPlan {
     /// Finds out how to draw group `number` of a scene.
-    pub(super) fn new(number: usize, group: &Group, grid: Grid, seed: u64) -> Result<GroupPlan, Fault> {
+    pub(super) fn new(number: usize, group: &Group, grid: &Grid, seed: u64) -> Result<GroupPlan, Fault> {
         let base = group.base();
         let fault = |key, problem| Fault::of_group(number, key, problem);
         let count = u32::try_from(base.count).expect("the count was checked");
@@ -158,7 +158,10 @@ impl GroupPlan {
         if let Some(model) = &base.model
             && model.grid() != grid
         {
-            return Err(fault("model", SceneErrorKind::Grid { model: model.grid(), scene: grid }));
+            return Err(fault(
+                "model",
+                SceneErrorKind::Grid { model: model.grid().clone(), scene: grid.clone() },
+            ));
         }
         if base.quantities.is_empty() {
             return Err(fault("quantities", SceneErrorKind::NoQuantities));
@@ -184,7 +187,7 @@ impl GroupPlan {
             Group::Targets(group) => {
                 let target = TargetPlan::new(group, grid.len(), stream).map_err(|(k, p)| fault(k, p))?;
                 if base.quantities.iter().any(|quantity| Quantity::COLOURS.contains(quantity)) {
-                    let invisible = || SceneErrorKind::Recipe(RecipeError::Invisible(grid));
+                    let invisible = || SceneErrorKind::Recipe(RecipeError::Invisible(grid.clone()));
                     let weights = colorimetry::xyz_weights(grid);
                     observer = Some(Observer(weights.ok_or_else(|| fault("wavelengths", invisible()))?));
                 }

@@ -13,9 +13,12 @@ use crate::cli::parse::grouped;
 const DRAWS: u64 = 20_000;
 
 /// Data to compare draws with.
+// A group has the name of its type, which is that of the command's as well.
 #[derive(clap::Args)]
+#[group(skip)]
 pub(super) struct Arguments {
-    /// Compare the draws with these measured spectra: files as `fit` reads them, or munsell, vrhel, granada
+    /// Compare the draws with these measured spectra: files as `fit` reads them, or
+    /// the name of a built-in table
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<String>,
     #[command(flatten)]
@@ -32,14 +35,17 @@ impl Arguments {
     pub(super) fn compare(&self, recipe: &Recipe, seed: u64) -> anyhow::Result<Option<Compared>> {
         if !self.is_asked() {
             if self.reading.is_asked() {
-                return Err(Usage("the options of reading files need some: name them with --data".to_owned()).into());
+                return Err(Usage(
+                    "the options of reading files need some: name them with --data".to_owned(),
+                )
+                .into());
             }
             return Ok(None);
         }
         let model = recipe.model();
         let mut tables: Vec<Table> = Vec::new();
         for name in &self.data {
-            let (table, notes) = self.reading.table(name, Some(model.grid()), model.grid())?;
+            let (table, notes) = self.reading.table(name, Some(model.grid()))?;
             notes.iter().for_each(|note| tell!("{}: {note}", table.name()));
             tables.push(table);
         }
@@ -52,7 +58,7 @@ impl Arguments {
             ))
             .into());
         }
-        let data = Dataset::new(&tables, model.grid(), Extrapolation::Error)?;
+        let data = Dataset::new(&tables, model.grid().clone(), Extrapolation::Error)?;
         let mean = data.spectra().mean();
         if model.kind() == SpectrumKind::Reflectance && mean > 1.0 {
             return Err(Usage(format!(

@@ -17,6 +17,7 @@ mod comparison;
 use self::comparison::Compared;
 use super::options::RecipeArguments;
 use super::parse::{grouped, number};
+use super::wavelengths::grid;
 use super::{if_exists, picture};
 
 /// Show the contents of a model: a table, and a picture where asked
@@ -26,8 +27,9 @@ pub(crate) struct Arguments {
     #[arg(value_name = "MODEL")]
     pub(crate) model: String,
 
-    /// The wavelengths of a built-in model, in nm, at which it is fitted [default: those of its name]
-    #[arg(long, value_name = "START:STEP:STOP")]
+    /// The wavelengths of a built-in model, in nm, at which it is fitted: a grid, a list as in 443,490,560, or a file of
+    /// them [default: those of its name]
+    #[arg(long, value_name = "START:STEP:STOP|FILE", value_parser = grid)]
     wavelengths: Option<Grid>,
 
     /// Draw the model, or its draws beside the data, into this file: .svg, .png or .pdf
@@ -59,7 +61,7 @@ pub(crate) struct Arguments {
 /// Prints the table, after making the picture where one is asked for.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
-    let model = super::model_at(&arguments.model, arguments.wavelengths)?;
+    let model = super::model_at(&arguments.model, arguments.wavelengths.as_ref())?;
     let recipe = arguments.request.recipe(&model);
     let compared = match &recipe {
         Ok(recipe) => arguments.data.compare(recipe, arguments.seed)?,
@@ -169,6 +171,11 @@ fn table(
     line(&mut text, "grid", &format!("{grid} nm"));
     line(&mut text, "bands", &model.bands().to_string());
     line(&mut text, "components", &model.components().to_string());
+    if let Some(error) = model.basis_correction() {
+        let said =
+            format!("made orthonormal, which it was to {error:.0e} only, as single precision leaves it");
+        line(&mut text, "basis", &said);
+    }
     line(&mut text, "normalization", normalization(model.parts().normalization));
     for (index, source) in model.parts().sources.iter().enumerate() {
         line(&mut text, if index == 0 { "sources" } else { "" }, source);

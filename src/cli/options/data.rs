@@ -8,7 +8,6 @@ use spectroll::{
 };
 
 use crate::cli::exit::Usage;
-use crate::cli::parse::grouped;
 
 /// Settings of the readers, for what a file does not say of itself or says wrongly.
 #[derive(Clone, clap::Args)]
@@ -23,9 +22,6 @@ pub(in crate::cli) struct DataArguments {
     /// Unit of the wavelengths [default: as the file states, or nm]
     #[arg(long, value_enum)]
     unit: Option<WavelengthUnit>,
-    /// Spectra that lack a value which the grid needs
-    #[arg(long, value_enum, default_value = "error")]
-    missing: Missing,
     /// Values that mean "not measured", as in --missing-value=-999 (several, with commas between them)
     #[arg(long, value_name = "V", value_delimiter = ',', allow_negative_numbers = true)]
     missing_value: Vec<f64>,
@@ -38,15 +34,6 @@ pub(in crate::cli) struct DataArguments {
     /// Leave out this many lines at the top of text
     #[arg(long, value_name = "N", default_value_t = 0)]
     skip: usize,
-}
-
-/// Treatment of spectra that lack a value which the grid needs.
-#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
-pub(in crate::cli) enum Missing {
-    /// An error
-    Error,
-    /// They are left out
-    Drop,
 }
 
 /// A factor above 0.
@@ -71,14 +58,18 @@ impl<'a> Source<'a> {
             return Source { path: name, array: None, wavelengths: None };
         }
         let (rest, wavelengths) = match name.rsplit_once('@') {
-            Some((rest, wavelengths)) if !wavelengths.is_empty() && !rest.is_empty() => (rest, Some(wavelengths)),
+            Some((rest, wavelengths)) if !wavelengths.is_empty() && !rest.is_empty() => {
+                (rest, Some(wavelengths))
+            }
             _ => (name, None),
         };
         if exists(rest) {
             return Source { path: rest, array: None, wavelengths };
         }
         match rest.rsplit_once(':') {
-            Some((path, array)) if !path.is_empty() && !array.is_empty() => Source { path, array: Some(array), wavelengths },
+            Some((path, array)) if !path.is_empty() && !array.is_empty() => {
+                Source { path, array: Some(array), wavelengths }
+            }
             _ => Source { path: rest, array: None, wavelengths },
         }
     }
@@ -87,16 +78,17 @@ impl<'a> Source<'a> {
 impl DataArguments {
     /// Reads what a name stands for: a built-in table, a file, an array of one. `grid` is that of files whose spectra have
     /// no wavelengths.
-    pub(in crate::cli) fn read(&self, name: &str, grid: Option<Grid>) -> anyhow::Result<Reading> {
+    pub(in crate::cli) fn read(&self, name: &str, grid: Option<&Grid>) -> anyhow::Result<Reading> {
         let source = Source::of(name);
         if Path::new(source.path).extension().is_none() && !Path::new(source.path).exists() {
             return Err(Usage(no_data(name)).into());
         }
-        let measured = source.wavelengths.filter(|text| text.contains(':')).map(str::parse::<Grid>).transpose();
+        let is_grid = |text: &&str| text.contains([':', ',']);
+        let measured = source.wavelengths.filter(is_grid).map(str::parse::<Grid>).transpose();
         let measured = measured.map_err(|e| Usage(format!("{name:?}: {e}")))?;
         let options = ReadOptions {
             array: source.array.map(str::to_owned),
-            wavelength_array: source.wavelengths.filter(|text| !text.contains(':')).map(str::to_owned),
+            wavelength_array: source.wavelengths.filter(|text| !is_grid(text)).map(str::to_owned),
             measured_at: measured.map(|grid| grid.wavelengths().collect()),
             fallback: grid.map(|grid| grid.wavelengths().collect()),
             layout: self.layout,
@@ -109,21 +101,17 @@ impl DataArguments {
         Ok(Table::read(source.path, &options)?)
     }
 
-    /// The table of a name, ready for a model on `grid`, and notes on what was done to it.
-    pub(in crate::cli) fn table(&self, name: &str, asked: Option<Grid>, grid: Grid) -> anyhow::Result<(Table, Vec<String>)> {
+    /// The table of a name, scaled, and notes on what was done to it.
+    pub(in crate::cli) fn table(
+        &self,
+        name: &str,
+        grid: Option<&Grid>,
+    ) -> anyhow::Result<(Table, Vec<String>)> {
         if let Some(builtin) = BuiltinTable::named(name) {
             return Ok((builtin.table().scaled(self.scale), Vec::new()));
         }
-        let Reading { table, mut notes, .. } = self.read(name, asked)?;
-        let mut table = table.scaled(self.scale);
-        if self.missing == Missing::Drop {
-            let (left, gone) = table.without_missing(grid.first(), grid.last())?;
-            table = left;
-            if gone > 0 {
-                notes.push(format!("{} spectra that lack a value were left out", grouped(gone as u64)));
-            }
-        }
-        Ok((table, notes))
+        let Reading { table, notes, .. } = self.read(name, grid)?;
+        Ok((table.scaled(self.scale), notes))
     }
 
     /// Whether any setting differs from what is done unless told otherwise.
@@ -131,7 +119,6 @@ impl DataArguments {
         self.scale != 1.0
             || self.layout.is_some()
             || self.unit.is_some()
-            || self.missing != Missing::Error
             || !self.missing_value.is_empty()
             || self.separator.is_some()
             || self.decimal.is_some()
@@ -152,9 +139,10 @@ fn no_data(name: &str) -> String {
              START:STEP:STOP` fits it at another grid"
         );
     }
-    let tables = BuiltinTable::ALL.iter().map(|table| table.name());
-    let meant = closest(name, tables).map_or(String::new(), |meant| format!(", did you mean {meant}?"));
-    format!("{name:?} is neither a file nor a built-in table (munsell, vrhel, granada){meant}")
+    let tables = || BuiltinTable::ALL.iter().map(|table| table.name());
+    let known = tables().collect::<Vec<_>>().join(", ");
+    let meant = closest(name, tables()).map_or(String::new(), |meant| format!(", did you mean {meant}?"));
+    format!("{name:?} is neither a file nor a built-in table ({known}){meant}")
 }
 
 #[cfg(test)]

@@ -14,14 +14,14 @@ pub(super) enum Colours {
 }
 
 impl Colours {
-    pub(super) fn new(kind: SpectrumKind, grid: Grid, theme: Theme) -> Colours {
+    pub(super) fn new(kind: SpectrumKind, grid: &Grid, theme: Theme) -> Colours {
         match (colorimetry::xyz_weights(grid), kind) {
             (None, _) => Colours::Unseen(theme.quiet()),
             (Some(weights), SpectrumKind::Reflectance) => {
                 Colours::Reflected(weights, theme.white_luminance())
             }
             (Some(_), SpectrumKind::Illuminant) => {
-                Colours::Emitted(colorimetry::cmf(grid), theme.chromatic_luminance())
+                Colours::Emitted(colorimetry::emitted_xyz_weights(grid), theme.chromatic_luminance())
             }
         }
     }

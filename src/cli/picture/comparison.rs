@@ -69,7 +69,7 @@ impl Picture<'_> {
     /// The middle nine tenths of the spectra, band by band, and their medians.
     fn ranges(&self) -> Panel {
         let grid = self.model.grid();
-        let axes = Axes { kind: self.model.kind(), grid, theme: self.theme };
+        let axes = Axes { kind: self.model.kind(), grid: grid.clone(), theme: self.theme };
         let mut plots: Vec<Plot> = Vec::new();
         let mut shown = Vec::new();
         for (spectra, colour) in
@@ -205,7 +205,8 @@ mod tests {
     #[test]
     fn the_panels_show_data_and_draws() {
         let model = Model::builtin("munsell-vrhel").unwrap();
-        let data = Dataset::new(&[BuiltinTable::Vrhel.table()], model.grid(), Extrapolation::Error).unwrap();
+        let data =
+            Dataset::new(&[BuiltinTable::Vrhel.table()], model.grid().clone(), Extrapolation::Error).unwrap();
         let recipe = Recipe::builder(&model).build().unwrap();
         let comparison = Comparison::new(&recipe, &data, Stream::new(0), 300).unwrap();
         let picture = Picture {

@@ -106,7 +106,12 @@ impl Picture<'_> {
             title: "As measured".to_owned(),
             note: match shown.len() == self.table.len() {
                 true => format!("{} spectra at {} wavelengths", self.table.len(), wavelengths.len()),
-                false => format!("{} of {} spectra at {} wavelengths", shown.len(), self.table.len(), wavelengths.len()),
+                false => format!(
+                    "{} of {} spectra at {} wavelengths",
+                    shown.len(),
+                    self.table.len(),
+                    wavelengths.len()
+                ),
             },
             vertical: self.label(),
         };
@@ -118,18 +123,24 @@ impl Picture<'_> {
             Ok(data) => data,
             Err(reason) => {
                 let (words, mut note) = (reason.split_whitespace(), String::new());
-                words.take_while(|word| {
-                    note += word;
-                    note.push(' ');
-                    note.len() < 60
-                }).count();
+                words
+                    .take_while(|word| {
+                        note += word;
+                        note.push(' ');
+                        note.len() < 60
+                    })
+                    .count();
                 let layout = self.theme.axes((0.0, 1.0), (0.0, 1.0), MARGINS).with_x_label("wavelength (nm)");
                 let caption = Caption { title: "Not on the grid".to_owned(), note, vertical: self.label() };
                 return (vec![LinePlot::new().into()], layout, caption);
             }
         };
         let grid = data.grid();
-        let axes = Axes { kind: self.kind.unwrap_or(SpectrumKind::Illuminant), grid, theme: self.theme };
+        let axes = Axes {
+            kind: self.kind.unwrap_or(SpectrumKind::Illuminant),
+            grid: grid.clone(),
+            theme: self.theme,
+        };
         let colours = self.colours();
         let shown = self.shown();
         let line = |(of, index): (usize, &usize)| {
@@ -138,7 +149,10 @@ impl Picture<'_> {
             LinePlot::new().with_data(curve(grid, &values)).with_color(colour).with_stroke_width(1.0).into()
         };
         let plots: Vec<Plot> = shown.iter().enumerate().map(line).collect();
-        let columns: Vec<f64> = shown.iter().flat_map(|&i| data.spectra().column(i).iter().copied().collect::<Vec<_>>()).collect();
+        let columns: Vec<f64> = shown
+            .iter()
+            .flat_map(|&i| data.spectra().column(i).iter().copied().collect::<Vec<_>>())
+            .collect();
         let caption = Caption {
             title: format!("At {grid} nm"),
             note: colours.as_ref().map_or("as a model has them", |colours| colours.note()).to_owned(),

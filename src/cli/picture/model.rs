@@ -64,7 +64,7 @@ impl Picture<'_> {
     }
 
     fn axes(&self) -> Axes {
-        Axes { kind: self.model.kind(), grid: self.model.grid(), theme: self.theme }
+        Axes { kind: self.model.kind(), grid: self.model.grid().clone(), theme: self.theme }
     }
 
     fn draws(&self) -> Vec<Vec<f64>> {

@@ -45,7 +45,7 @@ pub(super) fn place(index: usize) -> Place {
 }
 
 /// Axes of spectra.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Axes {
     /// Kind of the spectra.
     pub(super) kind: SpectrumKind,
@@ -71,7 +71,7 @@ impl Axes {
     /// Axes for spectra.
     pub(super) fn spectra(&self, y: (f64, f64)) -> Layout {
         self.theme
-            .axes(ends(self.grid), y, MARGINS)
+            .axes(ends(&self.grid), y, MARGINS)
             .with_x_label("wavelength (nm)")
             .with_y_tick_format(TickFormat::Custom(Arc::new(spectral_value)))
     }
@@ -99,16 +99,16 @@ impl Axes {
 }
 
 /// The points of a spectrum's line. A single band is a line as wide as its step.
-pub(super) fn curve(grid: Grid, values: &[f64]) -> Vec<(f64, f64)> {
+pub(super) fn curve(grid: &Grid, values: &[f64]) -> Vec<(f64, f64)> {
     match values {
-        [value] => [-0.5, 0.5].map(|side| (grid.first() + side * grid.step(), *value)).to_vec(),
+        [value] => [-0.5, 0.5].map(|side| (grid.first() + side * grid.widths()[0], *value)).to_vec(),
         _ => grid.wavelengths().zip(values.iter().copied()).collect(),
     }
 }
 
 /// The ends of an axis of wavelengths.
-fn ends(grid: Grid) -> (f64, f64) {
-    let pad = if grid.len() == 1 { grid.step() } else { 0.0 };
+fn ends(grid: &Grid) -> (f64, f64) {
+    let pad = if grid.len() == 1 { grid.widths()[0] } else { 0.0 };
     (grid.first() - pad, grid.last() + pad)
 }
 

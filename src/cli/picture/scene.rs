@@ -126,7 +126,8 @@ impl Preview {
             lights => (0..grid.len()).map(|band| lights.iter().map(|l| f64::from(l[band])).sum()).collect(),
         };
         let Some(weights) = colorimetry::xyz_weights_under(&light, grid) else { return };
-        let shone: Vec<_> = lights.iter().map(|light| xyz(light, &emitted(grid))).collect();
+        let shone: Vec<_> =
+            lights.iter().map(|light| xyz(light, &colorimetry::emitted_xyz_weights(grid))).collect();
         let reflected = |kind| of(kind).into_iter().map(|s| xyz(s, &weights)).collect::<Vec<_>>();
         let (surfaces, targets) = (reflected(GroupKind::Surface), reflected(GroupKind::Target));
         if self.tiles.len() < TILES.0 * TILES.1 {
@@ -220,7 +221,7 @@ impl Preview {
         let place = (left - 36.0, (y_end + bottom) / 2.0);
         all.push(plot::upright(plot::text(place, LABEL_SIZE, &name('y'), TextAnchor::Middle, ink)));
         let locus = Grid::new(400.0, 1.0, 301).expect("it is a grid");
-        let [x, y, z] = colorimetry::cmf(locus);
+        let [x, y, z] = colorimetry::cmf(&locus);
         let mut border: Vec<_> = (0..locus.len())
             .map(|i| (x[i] / (x[i] + y[i] + z[i]), y[i] / (x[i] + y[i] + z[i])))
             .map(|(x, y)| at(x, y))
@@ -330,11 +331,6 @@ impl Values<'_> {
         let each = values.len() / (self.window.scenes.end - self.window.scenes.start) as usize;
         &values[self.number * each..(self.number + 1) * each]
     }
-}
-
-/// The weights of the bands in the tristimulus values of a light.
-fn emitted(grid: Grid) -> [Vec<f64>; 3] {
-    colorimetry::cmf(grid).map(|weights| weights.into_iter().map(|w| w * grid.step()).collect())
 }
 
 fn xyz(spectrum: &[f32], weights: &[Vec<f64>; 3]) -> [f64; 3] {

@@ -27,13 +27,26 @@ pub(in crate::cli) fn above_one(above_one: u64, draws: u64, setting: &str) -> Op
     })
 }
 
+/// Sentences of a summary on a model that is not quite what was given, or not quite what its draws are.
+pub(in crate::cli) fn doubts(model: &Model) -> impl Iterator<Item = String> {
+    corrected_basis(model).into_iter().chain(impossible_mean(model))
+}
+
 /// Says that draws cannot have the mean of their model, where that is so.
-pub(in crate::cli) fn impossible_mean(model: &Model) -> Option<String> {
+fn impossible_mean(model: &Model) -> Option<String> {
     let (wavelength, value) = model.impossible_mean()?;
     let bound = if value < 0.0 { "above 0" } else { "below 1" };
     Some(format!(
         "the model's mean is {value:.4} at {wavelength} nm, and spectra are {bound}: their mean is another, so check the \
          data of the model"
+    ))
+}
+
+/// Says that the basis of a model was made orthonormal, where that is so.
+fn corrected_basis(model: &Model) -> Option<String> {
+    let error = model.basis_correction()?;
+    Some(format!(
+        "the model's basis is orthonormal to {error:.0e} only, as single precision leaves it, and was made orthonormal"
     ))
 }
 

@@ -36,7 +36,8 @@ pub(super) fn begins(bytes: &[u8]) -> bool {
 
 /// Every real numeric array of a file that is not of version 7.3, in order, and what its comment says.
 pub(super) fn arrays(path: &Path, bytes: &[u8]) -> Result<Arrays, DatasetError> {
-    let failed = |reason: String| DatasetError::Format { path: path.to_owned(), format: "a MATLAB file", reason };
+    let failed =
+        |reason: String| DatasetError::Format { path: path.to_owned(), format: "a MATLAB file", reason };
     let file = match bytes.get(126..HEADER) {
         Some(b"IM") => File { little_endian: true },
         Some(b"MI") => File { little_endian: false },
@@ -142,7 +143,8 @@ impl File {
         let ((_, sides), rest) = self.part(rest)?;
         let ((_, name), rest) = self.part(rest)?;
         let count = (sides.len() / 4).min(8);
-        let sides = (0..count).map(|i| self.word(sides, i).map(|side| side as usize)).collect::<Option<_>>()?;
+        let sides =
+            (0..count).map(|i| self.word(sides, i).map(|side| side as usize)).collect::<Option<_>>()?;
         Some((self.word(flags, 0)?, sides, String::from_utf8_lossy(name).into_owned(), rest))
     }
 

@@ -55,7 +55,8 @@ pub(super) fn begins(bytes: &[u8]) -> bool {
     let Some(head) = head(bytes) else { return false };
     let name = bytes.get(20..20 + head.name);
     name.is_some_and(|name| {
-        name.last() == Some(&0) && name[..head.name - 1].iter().all(|b| b.is_ascii_alphanumeric() || *b == b'_')
+        name.last() == Some(&0)
+            && name[..head.name - 1].iter().all(|b| b.is_ascii_alphanumeric() || *b == b'_')
     })
 }
 
@@ -101,7 +102,10 @@ mod tests {
             bytes.extend(b"ab\0");
             bytes.extend([0.5, 0.25].map(double).concat());
             let found = arrays(&bytes).unwrap().all;
-            assert_eq!(found, [Array { name: "ab".to_owned(), sides: vec![2, 1], values: vec![0.5, 0.25], unit: None }]);
+            assert_eq!(
+                found,
+                [Array { name: "ab".to_owned(), sides: vec![2, 1], values: vec![0.5, 0.25], unit: None }]
+            );
             for end in 0..bytes.len() {
                 assert!(arrays(&bytes[..end]).is_err());
             }

@@ -20,8 +20,8 @@ pub(in crate::dataset) enum Cell<'t> {
 
 /// Words for a value that is not there, in small letters.
 const MISSING: [&str; 20] = [
-    "nan", "na", "n/a", "n.a.", "#n/a", "null", "none", "nil", "-", "--", "---", ".", "*", "?", "missing", "<na>", "1.#qnan",
-    "-1.#ind", "1.#ind", "-nan",
+    "nan", "na", "n/a", "n.a.", "#n/a", "null", "none", "nil", "-", "--", "---", ".", "*", "?", "missing",
+    "<na>", "1.#qnan", "-1.#ind", "1.#ind", "-nan",
 ];
 
 impl<'t> Cell<'t> {
@@ -49,7 +49,8 @@ impl<'t> Cell<'t> {
             && tail.len() <= 12
             && !tail.eq_ignore_ascii_case("a")
             && (tail.contains("cm") || !tail.contains(|c: char| c.is_ascii_digit()))
-            && let (Some(value), Some(unit)) = (number(head.trim_end(), decimal), WavelengthUnit::named_in(tail))
+            && let (Some(value), Some(unit)) =
+                (number(head.trim_end(), decimal), WavelengthUnit::named_in(tail))
         {
             return Cell::Length(value, unit);
         }
@@ -92,7 +93,10 @@ pub(super) fn number(text: &str, decimal: Decimal) -> Option<f64> {
 
 /// Wavelength that a heading names, as in `400`, `400 nm`, `R400`, `X400.5` or `NM_400`, and the unit that it has. Whether
 /// letters stand before the number is the last of the three.
-pub(in crate::dataset) fn heading_wavelength(text: &str, decimal: Decimal) -> Option<(f64, Option<WavelengthUnit>, bool)> {
+pub(in crate::dataset) fn heading_wavelength(
+    text: &str,
+    decimal: Decimal,
+) -> Option<(f64, Option<WavelengthUnit>, bool)> {
     let text = text.trim().trim_matches(['[', ']', '(', ')', '"', '\'']);
     match Cell::parse(text, decimal) {
         Cell::Number(value) => return Some((value, None, false)),
@@ -102,7 +106,9 @@ pub(in crate::dataset) fn heading_wavelength(text: &str, decimal: Decimal) -> Op
     let start = text.find(|c: char| c.is_ascii_digit())?;
     let (prefix, rest) = text.split_at(start);
     let is_prefix = prefix.len() <= 16
-        && prefix.chars().all(|c| c.is_alphabetic() || matches!(c, '_' | ' ' | '.' | '-' | '(' | '[' | ':' | '=' | '@'));
+        && prefix
+            .chars()
+            .all(|c| c.is_alphabetic() || matches!(c, '_' | ' ' | '.' | '-' | '(' | '[' | ':' | '=' | '@'));
     if !is_prefix {
         return None;
     }
@@ -134,7 +140,14 @@ mod tests {
         ] {
             assert_eq!(Cell::parse(text, decimal), Cell::Number(value), "{text}");
         }
-        for (text, decimal) in [("0,5", Point), ("0.5", Comma), ("1.234,5", Comma), ("5,", Comma), ("1 2", Point), ("0x1", Point)] {
+        for (text, decimal) in [
+            ("0,5", Point),
+            ("0.5", Comma),
+            ("1.234,5", Comma),
+            ("5,", Comma),
+            ("1 2", Point),
+            ("0x1", Point),
+        ] {
             assert!(matches!(Cell::parse(text, decimal), Cell::Text(_)), "{text}");
         }
         for text in ["", " ", "NaN", "n/a", "#N/A", "--", "-1.#IND"] {
@@ -156,7 +169,8 @@ mod tests {
             ("NM_400", 400.0, true),
             ("R(400)", 400.0, true),
         ] {
-            let found = heading_wavelength(text, Decimal::Point).map(|(value, _, lettered)| (value, lettered));
+            let found =
+                heading_wavelength(text, Decimal::Point).map(|(value, _, lettered)| (value, lettered));
             assert_eq!(found, Some((value, lettered)), "{text}");
         }
         for text in ["leaf", "s1b", "400-410", ""] {

@@ -31,8 +31,9 @@ pub(super) struct Column {
 impl Column {
     /// Finds the column of a table: the first whose heading says so, else the first that is neither text nor a counter.
     pub(super) fn find(sheet: &Sheet, extent: Extent, options: &ReadOptions) -> Result<Column, SheetError> {
-        let all: Vec<Column> =
-            (0..extent.width.min(MAX_BEFORE)).map(|column| Column::at(sheet, extent, column, options)).collect();
+        let all: Vec<Column> = (0..extent.width.min(MAX_BEFORE))
+            .map(|column| Column::at(sheet, extent, column, options))
+            .collect();
         if let Some(named) = all.iter().find(|column| column.is_named && !column.rows.is_empty()) {
             return Column::at(sheet, extent, named.column, options).checked(sheet);
         }
@@ -97,7 +98,8 @@ impl Column {
     fn checked(self, sheet: &Sheet) -> Result<Column, SheetError> {
         let Err(fault) = axis::check(&self.axis.values) else { return Ok(self) };
         let raw = self.raw(sheet);
-        let (low, high) = raw.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
+        let (low, high) =
+            raw.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
         let name = self.name();
         let place = |row: usize| sheet.place(self.rows[row], self.column);
         Err(match fault {
@@ -133,8 +135,10 @@ impl Column {
             ),
             AxisFault::Range(..) | AxisFault::None => {
                 let guess = WavelengthUnit::guess(low, high).filter(|unit| *unit != self.axis.unit);
-                let reason =
-                    format!("{name} runs from {low} to {high}, which no wavelengths in {} do", self.axis.unit);
+                let reason = format!(
+                    "{name} runs from {low} to {high}, which no wavelengths in {} do",
+                    self.axis.unit
+                );
                 match guess {
                     Some(unit) if axis::monotone(&raw).is_ok() => SheetError::new(
                         format!("{reason}; where they are in {unit}, say so"),
@@ -151,7 +155,9 @@ impl Column {
         let mut notes = Vec::new();
         let (first, last) = (self.rows[0], self.rows[self.rows.len() - 1]);
         self.check_rows(sheet, extent, first, last)?;
-        let above = (0..first).filter(|&row| !sheet.row(row).is_comment && sheet.row(row).cells + 1 < extent.width).count();
+        let above = (0..first)
+            .filter(|&row| !sheet.row(row).is_comment && sheet.row(row).cells + 1 < extent.width)
+            .count();
         if above > 0 {
             notes.push(format!("{above} {}s above the table are not part of it", sheet.row_name));
         }
@@ -234,7 +240,9 @@ impl Column {
         }
         // A row that is cut short, or one cell longer, is not a remark below the table.
         let after = (last + 1..sheet.rows.len()).find(|&row| {
-            !sheet.row(row).is_comment && !sheet.value(row, self.column).is_nan() && sheet.numbers(row) >= 2.min(extent.width)
+            !sheet.row(row).is_comment
+                && !sheet.value(row, self.column).is_nan()
+                && sheet.numbers(row) >= 2.min(extent.width)
         });
         after.map_or(Ok(()), |row| Err(misfit(sheet, extent, row, self.column)))
     }
@@ -282,7 +290,10 @@ impl Percents {
             Some(Mark::Length(unit)) => {
                 return Err(SheetError::at(
                     sheet.place(row, column),
-                    format!("a value of {} {unit} is a wavelength and not one of a spectrum", sheet.value(row, column)),
+                    format!(
+                        "a value of {} {unit} is a wavelength and not one of a spectrum",
+                        sheet.value(row, column)
+                    ),
                     Remedy::Layout,
                 ));
             }

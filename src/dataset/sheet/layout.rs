@@ -62,14 +62,16 @@ impl Axis {
 pub(super) struct Extent {
     /// Cells of most rows that hold numbers.
     pub(super) cells: usize,
-    /// The same without columns at the end that are empty throughout.
+    /// Cells of most rows without columns at the end that are empty throughout.
     pub(super) width: usize,
 }
 
 impl Extent {
     fn of(sheet: &Sheet) -> Option<Extent> {
         let mut lengths = std::collections::BTreeMap::<usize, usize>::new();
-        for row in (0..sheet.rows.len()).filter(|&row| sheet.row(row).cells >= 2 && !sheet.row(row).is_comment) {
+        for row in
+            (0..sheet.rows.len()).filter(|&row| sheet.row(row).cells >= 2 && !sheet.row(row).is_comment)
+        {
             *lengths.entry(sheet.row(row).cells).or_default() += sheet.numbers(row);
         }
         let (&cells, &numbers) = lengths.iter().max_by_key(|(_, numbers)| **numbers)?;
@@ -80,9 +82,9 @@ impl Extent {
         let is_used = |row: usize, column: usize| {
             !sheet.value(row, column).is_nan() || sheet.text(row, column).is_some()
         };
-        let used = (0..sheet.rows.len()).filter(of_table).map(|row| {
-            (0..cells).rev().find(|&column| is_used(row, column)).map_or(0, |last| last + 1)
-        });
+        let used = (0..sheet.rows.len())
+            .filter(of_table)
+            .map(|row| (0..cells).rev().find(|&column| is_used(row, column)).map_or(0, |last| last + 1));
         Some(Extent { cells, width: used.max()? })
     }
 
@@ -154,7 +156,8 @@ fn preferred(column: &Column, heading: &Heading) -> Option<(TableLayout, &'stati
     if column.is_named && !heading.axis.is_strong() {
         return Some((TableLayout::Columns, "the heading of its first column says wavelengths"));
     }
-    let (counts_down, counts_across) = (axis::counts(&column.axis.values), axis::counts(&heading.axis.values));
+    let (counts_down, counts_across) =
+        (axis::counts(&column.axis.values), axis::counts(&heading.axis.values));
     match (counts_down, counts_across) {
         (true, false) if heading.axis.is_strong() && !column.is_named => return Some(across),
         (false, true) if column.axis.is_strong() => return Some(down),

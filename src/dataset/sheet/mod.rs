@@ -122,7 +122,10 @@ impl Sheet {
             self.values.truncate(row.start);
         }
         if self.values.len() > MAX_CELLS || self.rows.len() > MAX_CELLS / 8 {
-            return Err(SheetError::new("it has more cells than 512 MiB hold: split it, or keep only the spectra", Remedy::None));
+            return Err(SheetError::new(
+                "it has more cells than 512 MiB hold: split it, or keep only the spectra",
+                Remedy::None,
+            ));
         }
         if self.texts.len() + self.marks.len() > MAX_TEXTS + self.values.len() / 2 {
             return Err(SheetError::new(
@@ -198,9 +201,12 @@ pub(super) fn score(sheet: &Sheet) -> i64 {
     for (index, row) in sheet.rows.iter().enumerate().filter(|(_, row)| row.cells >= 2 && !row.is_comment) {
         *lengths.entry(row.cells).or_default() += sheet.numbers(index) as i64;
     }
-    let Some((&cells, _)) = lengths.iter().max_by_key(|(cells, numbers)| (**numbers, **cells)) else { return 0 };
+    let Some((&cells, _)) = lengths.iter().max_by_key(|(cells, numbers)| (**numbers, **cells)) else {
+        return 0;
+    };
     let mut score = 0;
-    for (index, row) in sheet.rows.iter().enumerate().filter(|(_, row)| row.cells == cells && !row.is_comment) {
+    for (index, row) in sheet.rows.iter().enumerate().filter(|(_, row)| row.cells == cells && !row.is_comment)
+    {
         let (numbers, texts) = (sheet.numbers(index) as i64, sheet.text_cells(index) as i64);
         // A heading of text speaks against nothing.
         score += if numbers == 0 { 0 } else { 2 * numbers - 3 * texts };
@@ -223,10 +229,12 @@ impl Sheet {
         self.rows.len()
     }
 
-    /// Whether the cells, all whole numbers, can be the halves of numbers with decimal commas; none where a heading has as
+    /// Two readings of cells that are all whole numbers, where they can be the halves of numbers with decimal commas; none where a heading has as
     /// many cells.
     pub(super) fn comma_doubt(&self) -> Option<CommaDoubt> {
-        let is_data = |row: &usize| !self.row(*row).is_comment && self.row(*row).cells >= 2 && self.text_cells(*row) == 0;
+        let is_data = |row: &usize| {
+            !self.row(*row).is_comment && self.row(*row).cells >= 2 && self.text_cells(*row) == 0
+        };
         let data: Vec<usize> = (0..self.rows.len()).filter(is_data).collect();
         let first = *data.first()?;
         let cells = self.row(first).cells;
@@ -251,7 +259,8 @@ impl Sheet {
         if !can_be {
             return None;
         }
-        let shown = |row: usize| (0..cells.min(7)).map(|column| value(row, column).to_string()).collect::<Vec<_>>();
+        let shown =
+            |row: usize| (0..cells.min(7)).map(|column| value(row, column).to_string()).collect::<Vec<_>>();
         let whole = shown(first);
         let mut decimals: Vec<String> = whole[..start.min(whole.len())].to_vec();
         decimals.extend(whole[start..].chunks_exact(2).map(|pair| pair.join(",")));

@@ -68,10 +68,10 @@ impl Heading {
         run: Run,
         options: &ReadOptions,
     ) -> Result<Heading, SheetError> {
-        let left: String = (0..run.start).filter_map(|column| sheet.text(row, column)).collect::<Vec<_>>().join(" ");
-        let stated = run.unit.or_else(|| {
-            is_wavelength_word(&left).then(|| WavelengthUnit::named_in(&left)).flatten()
-        });
+        let left: String =
+            (0..run.start).filter_map(|column| sheet.text(row, column)).collect::<Vec<_>>().join(" ");
+        let stated =
+            run.unit.or_else(|| is_wavelength_word(&left).then(|| WavelengthUnit::named_in(&left)).flatten());
         let unit = options.unit.or(stated).unwrap_or(WavelengthUnit::Nm);
         let values: Vec<f64> = run.raw.iter().map(|&value| unit.in_nm(value)).collect();
         let name = || format!("{} ({})", sheet.line(row), sheet.shown(row));
@@ -89,8 +89,10 @@ impl Heading {
                     Remedy::None,
                 ),
                 AxisFault::Range(..) if run.raw.len() >= 2 => {
-                    let (low, high) =
-                        run.raw.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
+                    let (low, high) = run
+                        .raw
+                        .iter()
+                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
                     let guess = WavelengthUnit::guess(low, high).filter(|guess| *guess != unit);
                     match guess {
                         Some(guess) if axis::is_even(&run.raw) || run.raw.len() >= 12 => SheetError::new(

@@ -39,7 +39,9 @@ impl Dialect {
             for &separator in Separator::ALL {
                 let is_asked = options.separator.is_none_or(|asked| asked == separator)
                     && options.decimal.is_none_or(|asked| asked == decimal);
-                if !is_asked || (separator == Separator::Space && options.separator.is_none() && !has_blanks(text)) {
+                if !is_asked
+                    || (separator == Separator::Space && options.separator.is_none() && !has_blanks(text))
+                {
                     continue;
                 }
                 let dialect = Dialect { separator, decimal };
@@ -169,7 +171,9 @@ fn blanks<'t>(line: &'t str, mut give: impl FnMut(&'t str)) {
         };
         let after = after.trim_start();
         let unit = ["nm", "%", "um", "µm"].into_iter().find(|unit| {
-            after.strip_prefix(unit).is_some_and(|rest| rest.is_empty() || rest.starts_with(char::is_whitespace))
+            after
+                .strip_prefix(unit)
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with(char::is_whitespace))
         });
         let is_number = word.ends_with(|c: char| c.is_ascii_digit());
         match unit {
@@ -195,7 +199,8 @@ fn quoted(
     skip: usize,
     limit: Option<usize>,
 ) -> Result<Option<Sheet>, SheetError> {
-    let start = lines(text).nth(skip).map_or(text.len(), |(_, line)| line.as_ptr() as usize - text.as_ptr() as usize);
+    let start =
+        lines(text).nth(skip).map_or(text.len(), |(_, line)| line.as_ptr() as usize - text.as_ptr() as usize);
     let mut reader = ::csv::ReaderBuilder::new()
         .delimiter(separator)
         .has_headers(false)

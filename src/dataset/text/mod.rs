@@ -57,7 +57,9 @@ pub(super) fn read_text(
 fn stated_unit(text: &str) -> Option<WavelengthUnit> {
     let states = |line: &&str| {
         let lower = line.trim_start_matches(['#', '%', ' ']).to_lowercase();
-        ["x units", "xunits", "x-units", "wavelength units", "wavelength unit"].iter().any(|start| lower.starts_with(start))
+        ["x units", "xunits", "x-units", "wavelength units", "wavelength unit"]
+            .iter()
+            .any(|start| lower.starts_with(start))
     };
     let line = text.lines().take(100).find(states)?;
     WavelengthUnit::named_in(line.split_once([':', '=', ',', ';', '\t'])?.1)

@@ -221,7 +221,7 @@ fn xyz_weights(model: &Model) -> [Vec<f64>; 3] {
     match model.kind() {
         SpectrumKind::Reflectance => colorimetry::xyz_weights(grid).unwrap_or_else(none),
         SpectrumKind::Illuminant => {
-            let cmf = colorimetry::cmf(grid);
+            let cmf = colorimetry::emitted_xyz_weights(grid);
             let mean: f64 = cmf[1].iter().zip(&model.parts().mean).map(|(y, m)| y * m).sum();
             if mean > 0.0 { cmf.map(|f| f.iter().map(|v| v / mean).collect()) } else { none() }
         }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::estimate::Moments;
 use super::{Bench, Effort, ReportError};
-use crate::dataset::{BuiltinTable, Dataset, SpectrumKind, Table};
+use crate::dataset::{Dataset, SpectrumKind, Table};
 use crate::evaluation::comparison::{Comparison, ComparisonFigures, determinant_ratio};
 use crate::grid::Extrapolation;
 use crate::model::Model;
@@ -175,14 +175,9 @@ fn spread(name: &str, count: Option<u64>, covariance: &DMatrix<f64>) -> Spread {
 
 /// Comparison of draws with the data that a built-in model was fitted to, where those are built in too.
 fn data(bench: &Bench, name: &str, model: &Model) -> Option<DataComparison> {
-    let sources: &[BuiltinTable] = match name {
-        _ if !Model::BUILTIN.contains(&name) => return None,
-        _ if name.starts_with("munsell-vrhel") => &[BuiltinTable::Munsell, BuiltinTable::Vrhel],
-        _ if name.starts_with("granada") => &[BuiltinTable::Granada],
-        _ => return None,
-    };
+    let sources = Model::builtin_data(name).ok()?.tables;
     let tables: Vec<Table> = sources.iter().map(|table| table.table()).collect();
-    let data = Dataset::new(&tables, model.grid(), Extrapolation::Error).ok()?;
+    let data = Dataset::new(&tables, model.grid().clone(), Extrapolation::Error).ok()?;
     let recipe = Recipe::builder(model).build().ok()?;
     let draws = bench.effort.pick(10_000, 50_000, 200_000);
     let comparison = Comparison::new(&recipe, &data, Stream::named(bench.seed, "data"), draws).ok()?;

@@ -45,7 +45,8 @@ impl Oracle<'_> {
         let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
         let grid = scenario.model.grid();
         let [_, y, _] = colorimetry::cmf(grid);
-        let luminous: Vec<_> = colorimetry::d65(grid).iter().zip(y).map(|(e, y)| e * y).collect();
+        let light = colorimetry::d65(grid).into_iter().zip(grid.widths());
+        let luminous: Vec<_> = light.zip(y).map(|((e, width), y)| e * width * y).collect();
         Oracle {
             scenario,
             root: eigen.eigenvectors * DMatrix::from_diagonal(&roots),

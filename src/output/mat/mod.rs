@@ -19,6 +19,7 @@ use std::path::Path;
 use super::Encoder;
 use super::schema::{Schema, SharedArray, SpectraArray};
 use crate::dataset::SpectrumKind;
+use crate::grid::Grid;
 
 /// The bytes that a variable of v5 stays below.
 pub(super) const V5_BYTES: u64 = 1 << 31;
@@ -34,12 +35,17 @@ pub(super) struct Contents {
 }
 
 impl Contents {
-    /// [start step count] of the wavelengths; `None` where there are none.
-    fn sampling(&self) -> Option<[f64; 3]> {
+    /// The wavelengths as the Psychophysics Toolbox has them: the row [start step count] where they are even, else a
+    /// column of them all. With the rows and columns of it; `None` where there are no wavelengths.
+    fn sampling(&self) -> Option<(Vec<f64>, [u64; 2])> {
         let wavelengths = &self.schema.wavelengths;
         let first = *wavelengths.first()?;
         let step = wavelengths.get(1).map_or(1.0, |second| second - first);
-        Some([first, step, wavelengths.len() as f64])
+        let count = wavelengths.len();
+        Some(match Grid::from_wavelengths(wavelengths).is_ok_and(|grid| grid.step().is_none()) {
+            true => (wavelengths.clone(), [count as u64, 1]),
+            false => (vec![first, step, count as f64], [1, 3]),
+        })
     }
 }
 

@@ -67,8 +67,8 @@ impl<W: Write + Seek> Mat<W> {
             to.write_all(&variable(name, (class::DOUBLE, kind::DOUBLE), &dimensions, &bytes))
         };
         doubles("wavelength", &schema.wavelengths, [schema.wavelengths.len() as u64, 1])?;
-        if let Some(sampling) = contents.sampling() {
-            contents.samplings.iter().try_for_each(|name| doubles(name, &sampling, [1, 3]))?;
+        if let Some((sampling, dimensions)) = contents.sampling() {
+            contents.samplings.iter().try_for_each(|name| doubles(name, &sampling, dimensions))?;
         }
         let text = ascii(&schema.attributes_text());
         let dimensions = [1, text.len() as u64];

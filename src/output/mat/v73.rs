@@ -38,8 +38,10 @@ impl Mat {
             }
             let wavelengths = &schema.wavelengths;
             row(&file, "wavelength", wavelengths, &[1, wavelengths.len()])?;
-            if let Some(sampling) = contents.sampling() {
-                contents.samplings.iter().try_for_each(|name| row(&file, name, &sampling, &[3, 1]))?;
+            if let Some((sampling, [rows, columns])) = contents.sampling() {
+                // HDF5 names the dimensions in the other order.
+                let shape = [columns as usize, rows as usize];
+                contents.samplings.iter().try_for_each(|name| row(&file, name, &sampling, &shape))?;
             }
             comment(&file, &schema.attributes_text())
         };
