@@ -3,6 +3,7 @@
 
 // In the order in which the data pass through them: a room imports only from those above it.
 mod grid;
+mod parallel;
 #[doc(hidden)]
 pub mod suggestion;
 
@@ -41,6 +42,13 @@ pub mod export;
 #[doc(hidden)]
 pub mod evaluation;
 
+// The program, which other hosts may carry as well, as the Python package does. It names the library as they do.
+#[cfg(feature = "cli")]
+extern crate self as spectroll;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;
+
 pub use dataset::{BuiltinTable, Dataset, DatasetError, SpectrumKind, Table};
 pub use draw_status::DrawStatus;
 pub use engine::{Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, adapters};
@@ -50,7 +58,7 @@ pub use program::Bounds;
 pub use quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
 pub use random::philox::philox;
 pub use random::real::Real;
-pub use random::stream::{DrawRange, Stream, StreamRng};
+pub use random::stream::{DrawRange, Draws, Stream, StreamRng};
 pub use recipe::{
     CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Illuminant, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder,
     RecipeError, RecipeSettings, ScalarSampler, XyzScale,

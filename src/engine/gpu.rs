@@ -9,8 +9,9 @@ use wgpu::{BufferUsages, Features, PollType};
 use super::schedule::{Job, Pace, Window};
 use super::{Adapter, Batch, EngineError};
 use crate::quantity::Quantity;
-use crate::random::stream::DrawRange;
+use crate::random::stream::{DrawRange, Draws};
 use crate::sampler::{Prepared, Sampler};
+use crate::wgsl::Indexing;
 
 /// Number of windows in flight: one with the caller, one being computed, one waiting to be.
 const RING: usize = 3;
@@ -122,13 +123,13 @@ struct ReadyJob {
 }
 
 impl<'a> GpuSchedule<'a> {
-    pub(super) fn new(gpu: &'a Gpu, jobs: &[Job]) -> Result<Self, EngineError> {
+    pub(super) fn new(gpu: &'a Gpu, jobs: &[Job], indexing: Indexing) -> Result<Self, EngineError> {
         let mut roles: Vec<ReadyJob> = Vec::new();
         for (i, job) in jobs.iter().enumerate() {
             let program = job.recipe.program();
             let sampler = match jobs[..i].iter().position(|other| other.recipe.program() == program) {
                 Some(other) => roles[other].sampler.clone(),
-                None => Sampler::of(&gpu.device, &program.with_status())?,
+                None => Sampler::indexed(&gpu.device, &program.with_status(), indexing)?,
             };
             roles.push(ReadyJob { sampler, per_step: job.per_step });
         }
@@ -144,7 +145,7 @@ impl<'a> GpuSchedule<'a> {
 
     pub(super) fn draw<E: From<EngineError>>(
         &mut self,
-        draws: &[DrawRange],
+        draws: &[Draws],
         steps: u64,
         sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -178,7 +179,7 @@ impl<'a> GpuSchedule<'a> {
     }
 
     /// Allocates slots for windows of this number of steps. An error while drawing loses some of them.
-    fn make_room(&mut self, draws: &[DrawRange], steps: u64) -> Result<(), EngineError> {
+    fn make_room(&mut self, draws: &[Draws], steps: u64) -> Result<(), EngineError> {
         let needed = self.pace.most.min(steps);
         if self.capacity < needed {
             self.slots.clear();
@@ -213,10 +214,10 @@ struct Flight {
 }
 
 impl Slot {
-    fn new(gpu: &Gpu, jobs: &[ReadyJob], draws: &[DrawRange], window: Window) -> Result<Slot, EngineError> {
+    fn new(gpu: &Gpu, jobs: &[ReadyJob], draws: &[Draws], window: Window) -> Result<Slot, EngineError> {
         let usage = if gpu.shared_memory { BufferUsages::MAP_READ } else { BufferUsages::COPY_SRC };
-        let prepare = |(job, draws): (&ReadyJob, &DrawRange)| {
-            job.sampler.prepare_for(&gpu.device, window.of(*draws, job.per_step), usage)
+        let prepare = |(job, draws): (&ReadyJob, &Draws)| {
+            job.sampler.prepare_for(&gpu.device, window.of(*draws, job.per_step).range, usage)
         };
         let prepared = jobs.iter().zip(draws).map(prepare).collect::<Result<Vec<_>, _>>()?;
         let copy = |buffer: &wgpu::Buffer| {
@@ -232,12 +233,14 @@ impl Slot {
         Ok(Slot { prepared, staging })
     }
 
-    fn submit(mut self, gpu: &Gpu, draws: Vec<DrawRange>) -> Flight {
+    fn submit(mut self, gpu: &Gpu, draws: Vec<Draws>) -> Flight {
         let mut encoder = gpu.encoder();
         for (prepared, draws) in self.prepared.iter_mut().zip(&draws) {
-            prepared.set_draws(&gpu.queue, *draws).expect("a window has no more steps than a slot");
+            prepared.set_draws(&gpu.queue, draws.range).expect("a window has no more steps than a slot");
+            prepared.set_indices(&gpu.queue, *draws);
             prepared.record_first(&mut encoder);
         }
+        let draws = draws.iter().map(|draws| draws.range).collect();
         self.fly(gpu, encoder, draws, 1)
     }
 

@@ -3,14 +3,14 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::cpu::Kernel;
 use crate::draw_status::DrawStatus;
 use crate::engine::{Batch, DrawSummary, Engine, EngineError, Job, Schedule};
+use crate::parallel;
 use crate::quantity::Quantity;
-use crate::random::stream::DrawRange;
+use crate::random::stream::{DrawRange, Draws};
 
 use super::Scene;
 use super::group::IntensityScope;
@@ -18,6 +18,9 @@ use super::plan::{Array, Drawing, GroupPlan, Shapes, is_multiplied};
 
 /// Approximate size of a window in bytes, where no engine draws it.
 const WINDOW_BYTES: u64 = 8 << 20;
+
+/// Number of draws that are worth a thread.
+const GRAIN: u64 = 16;
 
 /// Some scenes, with every array that differs between scenes.
 #[derive(Debug)]
@@ -108,8 +111,8 @@ impl SharedSpectra {
     fn new(plan: &GroupPlan, drawing: &Drawing) -> Result<SharedSpectra, EngineError> {
         let kernel = Kernel::<f32>::new(drawing.recipe.program());
         let stream = plan.stream.in_rows(drawing.places);
-        let drawn = (0..u64::from(drawing.places)).into_par_iter().map(|place| kernel.draw(stream, place));
-        let (drawn, statuses): (Vec<_>, Vec<_>) = drawn.unzip();
+        let drawn = parallel::map(drawing.places.into(), GRAIN, |place| kernel.draw(stream, place));
+        let (drawn, statuses): (Vec<_>, Vec<_>) = drawn.into_iter().unzip();
         check(plan, drawing.places, 0, &statuses)?;
         // One for each element, or one for all.
         let copies = (plan.count / drawing.places) as usize;
@@ -201,6 +204,7 @@ impl SceneSession<'_> {
                         first: scenes.start * u64::from(drawing.places),
                         count: (scenes.end - scenes.start) * u64::from(drawing.places),
                     })
+                    .map(Draws::from)
                     .collect();
                 let places = drawings().next().map_or(1, |(_, drawing)| u64::from(drawing.places));
                 schedule.draw(&draws, scenes.end - scenes.start, |batches| {
@@ -251,10 +255,10 @@ pub(super) fn columns<'a>(
             Columns { values: values.collect(), ..Columns::default() }
         }
         (Shapes::Target(target), ..) => {
-            let elements = (scenes.start..scenes.end).into_par_iter();
-            let elements = elements.flat_map_iter(|scene| (0..plan.count).map(move |e| (scene, e)));
-            let drawn: Vec<_> =
-                elements.map(|(scene, element)| target.draw(plan.stream, scene, element)).collect();
+            let (each, count) = (u64::from(plan.count), scenes.end - scenes.start);
+            let drawn = parallel::map(count * each, GRAIN, |number| {
+                target.draw(plan.stream, scenes.start + number / each, (number % each) as u32)
+            });
             let statuses: Vec<DrawStatus> = drawn.iter().filter_map(|drawn| drawn.status).collect();
             check(plan, plan.count, scenes.start, &statuses)?;
             if !statuses.is_empty() {
@@ -270,7 +274,7 @@ pub(super) fn columns<'a>(
                         drawn.iter().filter_map(|d| d.xyz).flatten().collect()
                     }
                     (seen, Some(observer)) => {
-                        drawn.par_iter().flat_map_iter(|d| observer.see(&d.spectrum, seen)).collect()
+                        drawn.iter().flat_map(|d| observer.see(&d.spectrum, seen)).collect()
                     }
                     (other, None) => unreachable!("targets have no {other}"),
                 }
