@@ -3,9 +3,10 @@
 
 // In the order in which the data pass through them: a room imports only from those above it.
 mod grid;
-mod parallel;
 #[doc(hidden)]
+pub mod plain_file;
 pub mod suggestion;
+mod threads;
 
 mod dataset;
 
@@ -49,9 +50,14 @@ extern crate self as spectroll;
 #[doc(hidden)]
 pub mod cli;
 
-pub use dataset::{BuiltinTable, Dataset, DatasetError, SpectrumKind, Table};
+pub use dataset::{
+    BuiltinTable, Dataset, DatasetError, Decimal, ReadOptions, Reading, Remedy, Separator, SpectraCounts,
+    SpectrumKind, Table, TableLayout, Unphysical, WavelengthUnit,
+};
 pub use draw_status::DrawStatus;
-pub use engine::{Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, adapters};
+pub use engine::{
+    Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, WantedAdapter, adapters,
+};
 pub use grid::{Extrapolation, Grid, GridError};
 pub use model::{BuiltinData, Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};
 pub use program::Bounds;
@@ -64,6 +70,7 @@ pub use recipe::{
     RecipeError, RecipeSettings, ScalarSampler, XyzScale,
 };
 pub use sampler::{Prepared, Sampler, SamplerError};
+pub use threads::ThreadError;
 // What stands in signatures, so that hosts take the same versions.
 pub use wgsl::WgslError;
 pub use {half, nalgebra, rand, wgpu};

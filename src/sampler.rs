@@ -2,7 +2,6 @@
 //! polls or asks for a device.
 
 use bytemuck::{Pod, Zeroable};
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BufferUsages, Device};
 
 use crate::program::Program;
@@ -76,6 +75,12 @@ pub enum SamplerError {
          allow no more"
     )]
     TooManyAttempts { attempts: u32, largest: u32 },
+    #[error(
+        "{label} needs {bytes} bytes, and this device binds at most {largest} ({limit}): draw on the CPU"
+    )]
+    LargeTable { label: &'static str, bytes: u64, largest: u64, limit: &'static str },
+    #[error("the device has no buffer for {label}: it was lost, or has no memory left")]
+    NoBuffer { label: &'static str },
     #[error(
         "a range of {count} draws, where room for {prepared} was prepared: prepare the largest range first"
     )]
@@ -154,22 +159,13 @@ impl Sampler {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
-        let tables = (!tables.values.is_empty()).then(|| {
-            let bytes = bytemuck::cast_slice(&tables.values);
-            device.create_buffer_init(&BufferInitDescriptor {
-                label: Some("spectroll tables"),
-                contents: bytes,
-                usage: BufferUsages::STORAGE,
-            })
-        });
-        let cover = program.proposal.as_ref().map(|proposal| {
-            let words = proposal.rounded::<f32>().words();
-            device.create_buffer_init(&BufferInitDescriptor {
-                label: Some("spectroll cover"),
-                contents: bytemuck::cast_slice(&words),
-                usage: BufferUsages::STORAGE,
-            })
-        });
+        let storage = |label, bytes: &[u8]| filled(device, label, BufferUsages::STORAGE, bytes);
+        let tables = (!tables.values.is_empty())
+            .then(|| storage("spectroll tables", bytemuck::cast_slice(&tables.values)))
+            .transpose()?;
+        let words = program.proposal.as_ref().map(|proposal| proposal.rounded::<f32>().words());
+        let cover =
+            words.map(|words| storage("spectroll cover", bytemuck::cast_slice(&words))).transpose()?;
         Ok(Sampler {
             pipeline,
             tables,
@@ -257,11 +253,9 @@ impl Sampler {
             })
         };
         let outputs: Vec<_> = self.formats.iter().map(output).collect();
-        let parameters = device.create_buffer_init(&BufferInitDescriptor {
-            label: Some("spectroll parameters"),
-            contents: bytemuck::bytes_of(&self.parameters(draws)),
-            usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-        });
+        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+        let parameters = self.parameters(draws);
+        let parameters = filled(device, "spectroll parameters", usage, bytemuck::bytes_of(&parameters))?;
         let progress = (self.slices() > 1).then(|| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("spectroll progress"),
@@ -318,6 +312,36 @@ impl Sampler {
             padding: [0; 2],
         }
     }
+}
+
+/// Makes a buffer of these bytes; of four zeros where there are none, since a binding is not empty.
+pub(crate) fn filled(
+    device: &Device,
+    label: &'static str,
+    usage: BufferUsages,
+    bytes: &[u8],
+) -> Result<wgpu::Buffer, SamplerError> {
+    let (limits, size) = (device.limits(), bytes.len().max(4).next_multiple_of(4) as u64);
+    let bound = match usage.contains(BufferUsages::STORAGE) {
+        true => (limits.max_storage_buffer_binding_size, "max_storage_buffer_binding_size"),
+        false => (limits.max_uniform_buffer_binding_size, "max_uniform_buffer_binding_size"),
+    };
+    let (largest, limit) = bound.min((limits.max_buffer_size, "max_buffer_size"));
+    if size > largest {
+        return Err(SamplerError::LargeTable { label, bytes: size, largest, limit });
+    }
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size,
+        usage,
+        mapped_at_creation: true,
+    });
+    // Not `create_buffer_init`, which panics where the device is lost or has no memory left.
+    let mut view = buffer.get_mapped_range_mut(..).map_err(|_| SamplerError::NoBuffer { label })?;
+    view.slice(..bytes.len()).copy_from_slice(bytes);
+    drop(view);
+    buffer.unmap();
+    Ok(buffer)
 }
 
 /// A range of draws with its buffers, ready to be recorded into a wgpu command encoder, any number of times.

@@ -3,8 +3,8 @@
 #![allow(clippy::duplicate_mod)] // all examples have the host's boilerplate
 
 use spectroll::{
-    Engine, EngineChoice, EngineError, Layout, Model, Quantity, Recipe, Sampler, SamplerError, Stream,
-    colorimetry,
+    Engine, EngineChoice, EngineError, Layout, Model, ProposalKind, Quantity, Recipe, Sampler, SamplerError,
+    Stream, colorimetry,
     wgpu::{self, BufferUsages},
 };
 
@@ -117,6 +117,63 @@ fn what_does_not_fit_is_refused_with_the_limit() {
         .expect("it can be drawn");
     let error = Sampler::new(&device, &many).unwrap_err();
     assert_eq!(error, SamplerError::TooManyBuffers { buffers: 7, largest: 4 });
+}
+
+/// A device with limits of its own.
+fn limited(change: impl FnOnce(&mut wgpu::Limits)) -> (wgpu::Device, wgpu::Queue) {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
+        .expect("there is an adapter");
+    let mut limits = adapter.limits();
+    change(&mut limits);
+    let description = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+    pollster::block_on(adapter.request_device(&description)).expect("it has a device")
+}
+
+/// Errors and no panic, whatever becomes of the device.
+#[test]
+fn a_lost_device_is_an_error() {
+    let (device, queue) = limited(|_| ());
+    device.on_uncaptured_error(std::sync::Arc::new(|_| ()));
+    let recipe = surfaces();
+    let sampler = Sampler::new(&device, &recipe).expect("two buffers are few");
+    let mut prepared = sampler.prepare(&device, Stream::new(1).draws(0..10)).expect("they are few");
+    device.destroy();
+    let error = sampler.prepare(&device, Stream::new(1).draws(0..10)).unwrap_err();
+    assert_eq!(error, SamplerError::NoBuffer { label: "spectroll parameters" });
+    assert!(error.to_string().contains("it was lost"), "{error}");
+    let covered = Recipe::builder(recipe.model())
+        .proposal(ProposalKind::Cover)
+        .lrv(0.98)
+        .build()
+        .expect("it has a cover");
+    assert!(matches!(Sampler::new(&device, &covered), Err(SamplerError::NoBuffer { .. })));
+    let scene = spectroll::scene::Scene::preset("condition3").expect("it is built in");
+    let made = spectroll::scene::SceneSampler::new(&device, &scene);
+    assert!(made.is_err() || made.is_ok_and(|sampler| sampler.prepare(&device, 0..2).is_err()));
+    // What was prepared before records and submits nothing, and says so by the device's own errors.
+    prepared.set_draws(&queue, Stream::new(1).draws(0..5)).expect("there is room");
+    let mut encoder = device.create_command_encoder(&Default::default());
+    prepared.record(&mut encoder);
+    queue.submit([encoder.finish()]);
+}
+
+#[test]
+fn tables_that_a_device_cannot_bind_are_an_error() {
+    let (device, _) = limited(|limits| {
+        limits.max_buffer_size = 4096;
+        limits.max_storage_buffer_binding_size = 4096;
+        limits.max_uniform_buffer_binding_size = 4096;
+    });
+    let recipe = Recipe::builder(surfaces().model())
+        .proposal(ProposalKind::Cover)
+        .lrv(0.98)
+        .build()
+        .expect("it has a cover");
+    let error = Sampler::new(&device, &recipe).unwrap_err();
+    let SamplerError::LargeTable { label, bytes, largest, limit } = error else { panic!("{error}") };
+    assert!(label == "spectroll cover" && bytes > 4096 && largest == 4096, "{label} {bytes} {largest}");
+    assert_eq!(limit, "max_buffer_size");
 }
 
 /// A module as `naga_oil` imports it into another shader.

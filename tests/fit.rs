@@ -146,10 +146,11 @@ fn dataset(spectra: &[Vec<f64>]) -> Dataset {
 
 #[test]
 fn what_cannot_be_fitted_says_why() {
-    let nan = Table::new("swatches", vec![400.0, 410.0], &[vec![0.1, 0.2], vec![0.3, f64::NAN]]).unwrap_err();
+    let infinite =
+        Table::new("swatches", vec![400.0, 410.0], &[vec![0.1, 0.2], vec![0.3, f64::INFINITY]]).unwrap_err();
     assert_eq!(
-        nan.to_string(),
-        "spectrum 2 of swatches: the value at 410 nm is NaN; every value must be finite"
+        infinite.to_string(),
+        "spectrum 2 of swatches: the value at 410 nm is inf; every value must be finite, or missing"
     );
 
     let line = |a: f64| vec![0.5, 0.5 + a, 0.5 - a, 0.5];
@@ -175,7 +176,12 @@ fn what_cannot_be_fitted_says_why() {
         "{error}"
     );
     let unnormalized = Fit::new(SpectrumKind::Illuminant).components(1).normalization(Normalization::None);
-    assert!(unnormalized.fit(&dark).is_ok());
+    let error = unnormalized.fit(&dark).unwrap_err();
+    assert!(matches!(error, FitError::Unphysical(_)), "{error:?}");
+    assert!(
+        error.to_string().contains("spectrum 2 of swatches") && error.to_string().contains("-3"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -328,12 +328,12 @@ fn fits_read_what_samples_write() {
     for file in ["a.h5", "a.mat", "a.mat:X", "b.npy --wavelengths 400:10:700", "b.h5"] {
         assert_eq!(explains(file), expected, "{file}");
     }
-    fails(folder, "fit a.npy --kind reflectance -o x.json", 4, "(--wavelengths)");
+    fails(folder, "fit a.npy --kind reflectance -o x.json", 4, "(FILE@380:5:780)");
     fails(
         folder,
         "fit a.npy --kind reflectance --wavelengths 400:5:700 -o x.json",
         4,
-        "31 bands do not lie on the 61",
+        "its 31 bands are, and they are not the 61 of the model",
     );
     // These say what their draws are.
     for file in ["a.mat", "a.h5"] {

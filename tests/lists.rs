@@ -1,7 +1,6 @@
 //! Draws of lists of indices, and draws in the caller's arrays: the bytes of the same draws in ranges, on every engine.
 
 mod engines;
-mod sources;
 
 use std::sync::OnceLock;
 
@@ -147,19 +146,4 @@ fn the_callers_arrays_hold_what_windows_do() {
             }
         }
     }
-}
-
-/// A pool that a process shares would have no threads in the child of a fork, and the child would wait for them.
-#[test]
-fn no_room_works_in_a_pool_of_the_process() {
-    let mut users = Vec::new();
-    for (path, text) in sources::sources() {
-        let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
-        let is_examination = path.starts_with("src/evaluation");
-        if code.contains("rayon::prelude") && !is_examination {
-            users.push(path.display().to_string());
-        }
-    }
-    // Called in the pool of an engine.
-    assert_eq!(users, ["src/cpu/columns.rs"]);
 }

@@ -157,12 +157,12 @@ fn values_and_places_of_bad_data() {
         spectra[4] = value;
         [order.header(), order.doubles("sur_x", 3, &spectra), order.sampling("S_x", GRID)].concat()
     };
-    let text = message(&with(f64::NAN), None);
-    assert!(text.contains("spectrum 2") && text.contains("410 nm is NaN"), "{text}");
+    let missing = open(&with(f64::NAN), None).unwrap();
+    assert!(missing.spectrum(1)[1].is_nan() && missing.missing() == 1);
     assert!(message(&with(f64::INFINITY), None).contains("410 nm is inf"));
 
     let lone = [order.header(), order.doubles("sur_x", 3, &SPECTRA)].concat();
-    assert!(message(&lone, None).contains("no matrix of spectra with its wavelengths"));
+    assert!(message(&lone, None).contains("does not say at which wavelengths its 3 bands are"));
     let other_length =
         [order.header(), order.doubles("sur_x", 3, &SPECTRA), order.sampling("S_x", [400., 10., 4.])];
     assert!(message(&other_length.concat(), None).contains("sur_x (3 x 2)"));
@@ -173,12 +173,19 @@ fn other_versions_say_what_they_are() {
     #[cfg(feature = "hdf5")]
     {
         let v73 = [b"MATLAB 7.3 MAT-file".as_slice(), &[b' '; 600]].concat();
-        assert!(message(&v73, None).contains("is not readable HDF5"));
+        assert!(message(&v73, None).contains("is not readable as HDF5"));
     }
-    let v4 = [0u32, 3, 2, 0, 2, 0x78, 0, 0, 0, 0].map(u32::to_le_bytes).concat();
-    assert!(message(&[v4, vec![0; 200]].concat(), None).contains("version 4"));
+    let v4 = |name: &str, rows: u32, values: &[f64]| {
+        let head = [0, rows, values.len() as u32 / rows, 0, name.len() as u32 + 1].map(u32::to_le_bytes);
+        let values: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        [head.concat(), name.as_bytes().to_vec(), vec![0], values].concat()
+    };
+    let table = open(&[v4("sur_x", 3, &SPECTRA), v4("S_x", 1, &GRID)].concat(), None).unwrap();
+    assert_eq!((table.len(), table.spectrum(1)), (2, &SPECTRA[3..]));
+    // Text under the name of a MATLAB file is read as text.
     assert!(
-        message(b"not at all a MATLAB file, but long enough to look at", None).contains("no MATLAB header")
+        message(b"not at all a MATLAB file, but long enough to look at", None)
+            .contains("no table of numbers")
     );
     assert!(message(b"", None).contains("is empty"));
 }

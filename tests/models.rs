@@ -190,7 +190,7 @@ fn a_fit_takes_a_share_of_the_variance_and_a_scale() {
     std::fs::write(folder.path().join("percent.csv"), percent).unwrap();
     succeeds(
         folder.path(),
-        "fit percent.csv --kind reflectance -k 1 --scale 0.01 --wavelengths 400:10:420 -o percent.json",
+        "fit percent.csv --kind reflectance -k 1 --scale 0.01 --decimal point --wavelengths 400:10:420 -o percent.json",
     );
     assert!((model("percent.json").parts().mean[0] - 0.5).abs() < 1e-12);
 }

@@ -9,9 +9,10 @@ use std::path::Path;
 use sources::sources;
 
 /// Every room, in order. `lib.rs` and `main.rs`, which see them all, are none.
-const ROOMS: [&str; 22] = [
-    "parallel",
+const ROOMS: [&str; 23] = [
+    "plain_file",
     "suggestion",
+    "threads",
     "grid",
     "dataset",
     "colorimetry",

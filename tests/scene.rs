@@ -353,6 +353,20 @@ fn a_host_has_spectra_all_the_same() {
 }
 
 /// In a host's encoder the buffers hold what an engine draws.
+/// More spectra in one scene than a software adapter binds to one dispatch.
+#[test]
+fn scenes_too_large_for_one_dispatch_are_drawn_in_parts() {
+    let text = "scenes = 1\nseed = 4\n[[illuminant]]\nname = \"sun\"\nmodel = \"granada\"\ncount = 3\n\
+                [[surface]]\nname = \"wall\"\nmodel = \"munsell-vrhel\"\ncount = 1100000\n";
+    let scene = Scene::parse("walls.toml", text, Path::new("")).expect("it is a scene");
+    let limits = gpu().adapter().expect("it is one");
+    let (on_cpu, on_gpu) = (arrays(&scene, cpu(), 0..1), arrays(&scene, gpu(), 0..1));
+    assert_eq!(on_cpu.keys().collect::<Vec<_>>(), on_gpu.keys().collect::<Vec<_>>());
+    if gpu_is_software() {
+        assert!(on_cpu == on_gpu, "{limits}");
+    }
+}
+
 #[test]
 fn a_host_records_the_same_scenes() {
     let (device, queue) = host::device();

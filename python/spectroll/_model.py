@@ -36,6 +36,8 @@ class Model:
     __slots__ = ("_arrays", "_json", "_native")
 
     _native: _spectroll.Model
+    _arrays: dict[str, NDArray[np.float64]]
+    _json: str | None
 
     def __init__(
         self, name: str | os.PathLike[str] = "munsell-vrhel", wavelengths: Wavelengths | None = None
@@ -123,9 +125,10 @@ class Model:
 
     def to_json(self) -> str:
         """The text of a model file, from which `from_json` makes the same model to the last bit."""
-        if self._json is None:
-            object.__setattr__(self, "_json", self._native.to_json())
-        text: str = self._json
+        text = self._json
+        if text is None:
+            text = self._native.to_json()
+            object.__setattr__(self, "_json", text)
         return text
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
@@ -137,8 +140,7 @@ class Model:
             array: NDArray[np.float64] = getattr(self._native, name)
             array.flags.writeable = False
             self._arrays[name] = array
-        found: NDArray[np.float64] = self._arrays[name]
-        return found
+        return self._arrays[name]
 
     @property
     def name(self) -> str:

@@ -25,6 +25,8 @@ def of_draws(
     _, arrays = sampler._native(names)
     coordinates = coordinates_of(sampler, indices)
     for name, *_, axis, channels in arrays.formats:
+        if axis is None:
+            continue
         if axis == "wavelength":
             coordinates["wavelength"] = ("wavelength", sampler.wavelengths, {"units": "nm"})
         elif channels:

@@ -13,33 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._sampler import Sampler
-from ._values import choice, len_of, quantities_of, range_of, seed_of, stream_of, whole
+from ._values import len_of, quantities_of, range_of, seed_of, stream_of, whole
 
 if TYPE_CHECKING:
     import dask.array as da
 
 
 def _block(
-    sampler: Sampler, key: tuple[int, str | None], quantity: str, indices: tuple[int, int], chunks: int, block: int
-) -> NDArray[Any]:
-    """The draws of a block."""
-    first, count = indices
-    start = first + block * chunks
-    drawn: NDArray[Any] = sampler.draw(
-        range(start, min(start + chunks, first + count)), seed=key[0], stream=key[1], quantities=quantity
-    )
-    return drawn
-
-
-def _of_block_id(
     sampler: Sampler,
-    key: tuple[int, str | None],
+    source: tuple[int, str | None],
     quantity: str,
     indices: tuple[int, int],
-    chunks: int,
+    size: int,
     block_id: tuple[int, ...] = (0,),
 ) -> NDArray[Any]:
-    return _block(sampler, key, quantity, indices, chunks, block_id[0])
+    """The draws of a block, by its place."""
+    first, count = indices
+    start = first + block_id[0] * size
+    part = range(start, min(start + size, first + count))
+    drawn: NDArray[Any] = sampler.draw(part, seed=source[0], stream=source[1], quantities=quantity)
+    return drawn
 
 
 def array(
@@ -53,10 +46,11 @@ def array(
 ) -> da.Array:
     """See `Sampler.dask`."""
     import dask.array as da
+    from dask.base import tokenize
 
-    (quantity,), single = quantities_of(quantities) if isinstance(quantities, str) else ((None,), False)
-    if not single or quantity is None:
+    if not isinstance(quantities, str):
         raise TypeError(f"quantities={quantities!r}: an array of Dask is of one quantity; make one for each")
+    (quantity,), _ = quantities_of(quantities)
     indices = range_of(n, "n")
     if indices.step != 1 and len_of(indices) > 1:
         raise ValueError(f"n={n!r}: a lazy array has draws without gaps")
@@ -66,21 +60,21 @@ def array(
     _, dtype, width, axis, _ = alone._native((quantity,))[1].formats[0]
     rows = (size,) * (count // size) + ((count % size,) if count % size else ())
     shape: tuple[tuple[int, ...], ...] = (rows or (0,),) if axis is None else (rows or (0,), (width,))
-    name = dict(sampler=alone, key=(seed_of(seed), stream_of(stream)), quantity=quantity)
-    from dask.base import tokenize
-
-    token = tokenize(repr(alone._key()), alone.model.to_json(), name["key"], quantity, first, count, size)
-    return da.map_blocks(
-        _of_block_id,
+    source = seed_of(seed), stream_of(stream)
+    token = tokenize(alone._key(), alone.model.to_json(), source, quantity, first, count, size)
+    lazy: da.Array = da.map_blocks(  # type: ignore[no-untyped-call]
+        _block,
         chunks=shape,
         dtype=dtype,
         meta=np.empty((0,) * len(shape), dtype),
         name=f"spectroll-{quantity}-{token}",
+        sampler=alone,
+        source=source,
+        quantity=quantity,
         indices=(first, count),
-        **{"sampler": alone, "key": name["key"], "quantity": quantity},
-        # Not `chunks`, which is an argument of map_blocks itself.
-        **{},
+        size=size,
     )
+    return lazy
 
 
 def write(
@@ -110,8 +104,9 @@ def write(
     compute : bool
         False returns the lazy writes, one for each array, to be computed together.
     """
-    import dask
+    import dask.array as da
     import zarr
+    from dask.base import compute as together
 
     names, _ = quantities_of(quantities)
     group = zarr.open_group(path, mode="w" if overwrite else "w-", zarr_format=zarr_format)  # type: ignore[arg-type]
@@ -125,16 +120,17 @@ def write(
             name,
             shape=lazy.shape,
             dtype=lazy.dtype,
-            chunks=lazy.chunksize,
+            chunks=tuple(max(int(extent), 1) for extent in lazy.chunksize),
             **({"dimension_names": axes} if zarr_format == 3 else {"attributes": {"_ARRAY_DIMENSIONS": axes}}),
         )
         # Blocks are chunks, so that no two tasks write one, and no lock is needed.
-        writes.append(lazy.store(target, lock=False, compute=False))
+        store: Any = da.store
+        writes.append(store(lazy, target, lock=False, compute=False))
     grid = group.create_array("wavelength", data=np.asarray(sampler.wavelengths), **_axis(zarr_format))
     grid.attrs["units"] = "nm"
     if not compute:
         return writes
-    dask.compute(*writes)
+    together(*writes)  # type: ignore[no-untyped-call]
     return group
 
 
@@ -159,4 +155,4 @@ def attributes(sampler: Sampler, indices: range, seed: int, stream: str | None) 
     }
 
 
-__all__ = ["array", "choice", "write"]
+__all__ = ["array", "write"]

@@ -4,6 +4,8 @@ use std::ffi::OsString;
 
 use pyo3::prelude::*;
 
+use crate::error::Error;
+
 /// Runs the program with the words of `sys.argv`, and ends the process with its exit code.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>) -> PyResult<()> {
@@ -26,7 +28,7 @@ pub(crate) fn main(py: Python<'_>) -> PyResult<()> {
 
 /// The graphics adapters of this machine: for each its name, interface, kind and driver.
 #[pyfunction]
-pub(crate) fn adapters(py: Python<'_>) -> Vec<(String, String, String, String)> {
-    let all = py.detach(spectroll::adapters);
-    all.into_iter().map(|a| (a.name, a.backend, a.kind, a.driver)).collect()
+pub(crate) fn adapters(py: Python<'_>) -> PyResult<Vec<(String, String, String, String)>> {
+    let all = py.detach(spectroll::adapters).map_err(Error::from)?;
+    Ok(all.into_iter().map(|a| (a.name, a.backend, a.kind, a.driver)).collect())
 }

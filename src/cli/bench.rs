@@ -81,7 +81,7 @@ struct Spread {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let choices = match arguments.engine.choice() {
         Some(choice) => vec![choice],
-        None => (0..adapters().len())
+        None => (0..adapters()?.len())
             .map(|i| EngineChoice::Adapter(i.to_string()))
             .chain([EngineChoice::Cpu])
             .collect(),

@@ -5,7 +5,9 @@ use std::io;
 use spectroll::export::{ExportError, SelectionError};
 use spectroll::output::OutputError;
 use spectroll::scene::SceneError;
-use spectroll::{DatasetError, EngineError, FitError, ModelError, Quantity, RecipeError, WgslError};
+use spectroll::{
+    DatasetError, EngineError, FitError, ModelError, Quantity, RecipeError, Remedy, Unphysical, WgslError,
+};
 
 use super::interrupt::{self, Interrupted};
 
@@ -34,7 +36,11 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
         Some(ModelError::BuiltinRange { .. } | ModelError::BuiltinFit { .. })
     ) {
         2 // nothing that was read is wrong: the grid was asked for
-    } else if error.is::<DatasetError>() || error.is::<FitError>() || error.is::<ModelError>() {
+    } else if error.is::<DatasetError>()
+        || error.is::<Unphysical>()
+        || error.is::<FitError>()
+        || error.is::<ModelError>()
+    {
         4
     } else if error.is::<Unverified>() {
         5
@@ -52,17 +58,23 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
 
 fn of_engine(error: &EngineError) -> u8 {
     match error {
-        EngineError::NoAdapter { .. } | EngineError::NoAdapters => 3,
+        EngineError::NoAdapter { .. } | EngineError::NoAdapters | EngineError::UnknownBackend { .. } => 3,
         _ => 1,
     }
 }
 
 fn of_output(error: &OutputError) -> u8 {
     use OutputError::{
-        Cannot, Damaged, DamagedParts, Manifest, NotBuilt, NotStreamed, UnknownFormat, Unrepaired,
+        Cannot, Damaged, DamagedParts, LargeChunks, Manifest, ManyChunks, NotBuilt, NotStreamed,
+        UnknownFormat, Unrepaired,
     };
     match error {
-        UnknownFormat { .. } | Cannot { .. } | NotBuilt { .. } | NotStreamed => 2,
+        UnknownFormat { .. }
+        | Cannot { .. }
+        | NotBuilt { .. }
+        | NotStreamed
+        | ManyChunks { .. }
+        | LargeChunks { .. } => 2,
         Damaged { .. } | DamagedParts { .. } | Manifest { .. } | Unrepaired { .. } => 5,
         _ => 1,
     }
@@ -99,6 +111,7 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             OutputError::NothingMade { .. } => ": make each with --shard I/N --resume",
             OutputError::Unfinished { .. } => " (--resume or --force)",
             OutputError::NoSpace { .. } => " (--force-space overrides)",
+            OutputError::ManyChunks { .. } | OutputError::LargeChunks { .. } => " (--chunk)",
             OutputError::NotStreamed => " (--format csv or npy)",
             OutputError::Cannot { remedy, .. } if remedy.contains("quantity") => " (--quantities)",
             OutputError::Cannot { holds: "spectra", remedy: "choose spectra alone", .. } => " (--quantities)",
@@ -118,7 +131,6 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
     if let Some(error) = error.downcast_ref::<FitError>() {
         return match error {
             FitError::Power { .. } => " (--normalize none)",
-            FitError::NotReflectances { .. } => " (--scale 0.01, or --kind illuminant)",
             FitError::TooFewSpectra { .. }
             | FitError::Rank { .. }
             | FitError::Components(_)
@@ -126,15 +138,37 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             _ => "",
         };
     }
-    match error.downcast_ref::<DatasetError>() {
-        Some(DatasetError::NoWavelengths { .. }) => " (--wavelengths)",
-        Some(DatasetError::Range { .. }) => " (--wavelengths, --extrapolate)",
-        _ if matches!(error.downcast_ref(), Some(ModelError::BuiltinRange { .. })) => {
-            " (--wavelengths; `spectroll fit` takes other data)"
-        }
-        _ if matches!(error.downcast_ref(), Some(EngineError::NoAdapters)) => " (--engine cpu)",
-        _ => "",
+    if matches!(error.downcast_ref(), Some(ModelError::BuiltinRange { .. })) {
+        return " (--wavelengths; `spectroll fit` takes other data)";
     }
+    if matches!(error.downcast_ref(), Some(EngineError::NoAdapters)) { " (--engine cpu)" } else { "" }
+}
+
+/// The option that does what the message of an error of data advises, and the command that shows how a file was read.
+pub(super) fn data_remedy(error: &anyhow::Error) -> Option<String> {
+    let remedy = match (error.downcast_ref::<DatasetError>(), error.downcast_ref::<Unphysical>()) {
+        (Some(DatasetError::Read { .. }), _) => return None,
+        (Some(error), _) => error.remedy(),
+        (_, Some(error)) => error.remedy,
+        _ => match error.downcast_ref::<FitError>() {
+            Some(FitError::Unphysical(error)) => error.remedy,
+            Some(FitError::NotReflectances { .. }) => Remedy::Scale(0.01),
+            _ => return None,
+        },
+    };
+    let options = match remedy {
+        Remedy::MissingValue(value) => format!(" (--missing-value={value} --missing drop)"),
+        Remedy::Missing => " (--wavelengths, --missing drop)".to_owned(),
+        Remedy::Scale(factor) => format!(" (--scale {factor}, or --kind illuminant)"),
+        Remedy::Unit(unit) => format!(" (--unit {unit})"),
+        Remedy::Layout => " (--layout columns or rows)".to_owned(),
+        Remedy::Dialect => " (--separator, --decimal, --skip)".to_owned(),
+        Remedy::Decimal => " (--decimal point or comma)".to_owned(),
+        Remedy::MeasuredAt => " (FILE@380:5:780)".to_owned(),
+        Remedy::Wavelengths => " (--wavelengths, --extrapolate)".to_owned(),
+        _ => String::new(),
+    };
+    Some(options)
 }
 
 /// The option for a value that does not fit the type in which it was to be written.

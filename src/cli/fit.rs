@@ -3,19 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use spectroll::output::write_file;
-use spectroll::suggestion::closest;
-use spectroll::{BuiltinTable, Dataset, Extrapolation, Fit, Grid, Model, Normalization, SpectrumKind, Table};
+use spectroll::{
+    Dataset, Extrapolation, Fit, Grid, Model, Normalization, SpectraCounts, SpectrumKind, Table,
+};
 
 use super::exit::Usage;
 use super::if_exists;
-use super::parse::grouped;
+use super::options::DataArguments;
+use super::parse::{counted, grouped};
+use super::run::Waiting;
 
 /// Fit a model to measured spectra
 ///
-/// Files are MATLAB's (a matrix X of spectra in columns, and S_X = [start step count] or a vector wavelength beside it;
-/// FILE.mat:X picks one of several), .h5 (the same, spectra in rows), CSV (wavelengths in the first column, a spectrum
-/// in each other one) or .npy (spectra in rows, at --wavelengths). The names munsell, vrhel and granada stand for
-/// built-in tables. Several are fitted together.
+/// Files are text of any dialect with spectra in columns or rows, MATLAB's, HDF5, NumPy's (.npy, .npz), Parquet, Zarr,
+/// spreadsheets, ENVI libraries, JCAMP-DX or TM-27, told by their content; `spectroll look` shows how one is read.
+/// FILE:ARRAY picks one of several matrices, FILE:ARRAY@NAME its wavelengths, and FILE@380:5:780 says at which wavelengths
+/// it was measured where it does not. The names munsell, vrhel and granada stand for built-in tables. Several are fitted
+/// together.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// Files of spectra, or munsell, vrhel, granada
@@ -31,10 +35,6 @@ pub(crate) struct Arguments {
     /// The wavelengths, start:step:stop in nm [default: 400:10:700]
     #[arg(long, value_name = "GRID")]
     wavelengths: Option<Grid>,
-    /// Multiply the data by this: 0.01 makes reflectances of percentages
-    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", value_parser = factor,
-          allow_negative_numbers = true)]
-    scale: f64,
     /// Divide each spectrum by this first [default: mean for illuminants, none for reflectances]
     #[arg(long, value_enum)]
     normalize: Option<Normalization>,
@@ -47,6 +47,8 @@ pub(crate) struct Arguments {
     /// Replace the model file if it exists
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    data: DataArguments,
 }
 
 /// Size of a model.
@@ -65,11 +67,6 @@ fn components(text: &str) -> Result<Components, String> {
     parsed.ok_or_else(|| "expected a number of components, or a share of the variance as in 99.9%".to_owned())
 }
 
-pub(super) fn factor(text: &str) -> Result<f64, String> {
-    let factor = text.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0);
-    factor.ok_or_else(|| "expected a number above 0".to_owned())
-}
-
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(extension) = arguments.output.extension().filter(|e| !e.eq_ignore_ascii_case("json")) {
         let name = arguments.output.with_extension("json");
@@ -80,13 +77,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ))
         .into());
     }
-    let tables = arguments
-        .files
-        .iter()
-        .map(|file| Ok(table(file, arguments.wavelengths)?.scaled(arguments.scale)))
-        .collect::<anyhow::Result<Vec<_>>>()?;
+    let grid = arguments.wavelengths.unwrap_or(Grid::DEFAULT);
+    let mut tables = Vec::new();
+    for file in &arguments.files {
+        let (table, notes) = arguments.data.table(file, arguments.wavelengths, grid)?;
+        notes.iter().for_each(|note| tell!("{}: {note}", table.name()));
+        tables.push(table);
+    }
     let kind = kind(arguments, &tables)?;
-    let data = Dataset::new(&tables, arguments.wavelengths.unwrap_or(Grid::DEFAULT), arguments.extrapolate)?;
+    let data = Dataset::new(&tables, grid, arguments.extrapolate)?;
     let mut fit = match arguments.components {
         Components::Count(components) => Fit::new(kind).components(components),
         Components::Share(share) => Fit::new(kind).explain(share),
@@ -94,10 +93,24 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(normalize) = arguments.normalize {
         fit = fit.normalization(normalize);
     }
+    let waiting = Waiting::begin("fitting the model", false);
     let model = fit.fit(&data)?;
+    drop(waiting);
     write_file(&arguments.output, if_exists(arguments.force), (model.to_json() + "\n").as_bytes())?;
+    if let Ok(counts) = data.judge(kind) {
+        unusual(counts);
+    }
     report(&model, &data, &arguments.output);
     Ok(())
+}
+
+/// Says how many spectra have values that are unusual, and no error.
+fn unusual(counts: SpectraCounts) {
+    for (count, values) in [(counts.above_one, "above 1"), (counts.below_zero, "below 0")] {
+        if count > 0 {
+            tell!("{} with values {values}", counted(count as u64, "spectrum", "spectra"));
+        }
+    }
 }
 
 fn report(model: &Model, data: &Dataset, path: &Path) {
@@ -111,34 +124,6 @@ fn report(model: &Model, data: &Dataset, path: &Path) {
         model.kind(),
         model.grid(),
     );
-}
-
-/// The table of a built-in name, a file, or file:variable; at these wavelengths where the file does not say.
-pub(super) fn table(name: &str, grid: Option<Grid>) -> anyhow::Result<Table> {
-    if let Some(builtin) = BuiltinTable::named(name) {
-        return Ok(builtin.table());
-    }
-    let (path, variable) = match name.rsplit_once(':') {
-        Some((file, variable)) if !Path::new(name).exists() => (file, Some(variable)),
-        _ => (name, None),
-    };
-    if Path::new(path).extension().is_none() && !Path::new(path).exists() {
-        return Err(Usage(no_data(name)).into());
-    }
-    Ok(Table::open_on(Path::new(path), variable, grid)?)
-}
-
-/// Says what a name that is no file's may have meant.
-fn no_data(name: &str) -> String {
-    if Model::BUILTIN.contains(&name) {
-        return format!(
-            "{name} is a model, fitted already, and measured spectra are wanted here; `spectroll sample {name} --wavelengths \
-             START:STEP:STOP` fits it at another grid"
-        );
-    }
-    let tables = BuiltinTable::ALL.iter().map(|table| table.name());
-    let meant = closest(name, tables).map_or(String::new(), |meant| format!(", did you mean {meant}?"));
-    format!("{name:?} is neither a file nor a built-in table (munsell, vrhel, granada){meant}")
 }
 
 /// Kind of the spectra: as asked, else as their names say, if those agree.

@@ -46,27 +46,38 @@ pub(super) fn watch() {
 
 /// Catches the first Ctrl-C, for work that keeps what is done; the second one ends the program at once.
 pub(super) fn watch_once() {
-    let flag = INTERRUPTED.get_or_init(Arc::default);
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // Before the flag is set by the same signal.
-        signal_hook::flag::register_conditional_shutdown(signal, EXIT_CODE.into(), flag.clone())
-            .expect("it is a signal that can be handled");
-    }
+    // Before the flag is set by the same signal.
+    end_at_once(INTERRUPTED.get_or_init(Arc::default).clone());
     watch();
 }
 
+/// Lets Ctrl-C end the program at once from when `flag` is set, also where a shell had it ignored.
+fn end_at_once(flag: Arc<AtomicBool>) {
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, EXIT_CODE.into(), flag.clone())
+            .expect("it is a signal that can be handled");
+    }
+}
+
 /// Opens an output, and watches from when that should not be ended by the signal itself. Checking what is there of a set
-/// may take minutes and be ended at any moment; a file that is begun may not.
+/// may take minutes and be ended at any moment; a file that is begun may not. Standard output may: it leaves nothing to
+/// remove, and whoever does not read it would never let the signal be seen.
 pub(super) fn around<T>(output: &Output, open: impl FnOnce() -> T) -> T {
-    let is_set = matches!(output.destination(), Destination::Set(_));
-    if !is_set {
-        watch();
+    match output.destination() {
+        Destination::Stdout(_) => {
+            end_at_once(Arc::new(AtomicBool::new(true)));
+            open()
+        }
+        Destination::Set(_) => {
+            let opened = open();
+            watch();
+            opened
+        }
+        _ => {
+            watch();
+            open()
+        }
     }
-    let opened = open();
-    if is_set {
-        watch();
-    }
-    opened
 }
 
 /// Whether a signal is ignored, as far as Linux tells.

@@ -16,6 +16,7 @@ mod exit;
 mod fit;
 mod inspect;
 mod interrupt;
+mod look;
 mod models;
 mod options;
 mod packaging;
@@ -64,6 +65,7 @@ Examples:
   spectroll sample munsell-vrhel -n 1000000 -o reflectances.zarr --zstd
   spectroll verify reflectances.zarr
   spectroll scene --example condition3 --scenes 0..10 -o scenes.npz --preview scenes.png
+  spectroll look mine.csv -o mine.png
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
   spectroll shader granada --quantities linear_srgb --prefix sun > sun.wgsl
   spectroll inspect munsell-vrhel -o munsell-vrhel.png
@@ -75,6 +77,7 @@ Exit codes: 0 done, 1 failed while running, 2 wrong usage or impossible request,
 #[derive(Subcommand)]
 enum Command {
     Fit(fit::Arguments),
+    Look(look::Arguments),
     Sample(sample::Arguments),
     Scene(scene::Arguments),
     Verify(verify::VerifyArguments),
@@ -94,13 +97,24 @@ enum Command {
 /// help and mistakes in the words, which end the process.
 pub fn main(words: Vec<OsString>) -> u8 {
     let result = options::config::expand(&Arguments::command(), words);
-    let result =
-        result.map_err(anyhow::Error::from).and_then(|words| run(Arguments::parse_from(words).command));
+    let mut looks = false;
+    let result = result.map_err(anyhow::Error::from).and_then(|words| {
+        let command = Arguments::parse_from(words).command;
+        looks = matches!(command, Command::Look(_));
+        run(command)
+    });
     match result {
         Ok(()) => 0,
         Err(error) if exit::is_broken_pipe(&error) => 0, // the reader has what it wanted
         Err(error) => {
-            tell!("error: {error}{}", exit::remedy(&error)); // our messages hold their causes
+            // Our messages hold their causes.
+            match exit::data_remedy(&error) {
+                Some(options) if looks => tell!("error: {error}{options}"),
+                Some(options) => {
+                    tell!("error: {error}{options}; `spectroll look FILE` shows how a file is read")
+                }
+                None => tell!("error: {error}{}", exit::remedy(&error)),
+            }
             exit::code(&error)
         }
     }
@@ -109,6 +123,7 @@ pub fn main(words: Vec<OsString>) -> u8 {
 fn run(command: Command) -> anyhow::Result<()> {
     match &command {
         Command::Fit(arguments) => fit::run(arguments),
+        Command::Look(arguments) => look::run(arguments),
         Command::Sample(arguments) => sample::run(arguments),
         Command::Scene(arguments) => scene::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),

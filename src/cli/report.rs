@@ -1,8 +1,8 @@
 //! `spectroll report`: the cost of draws, their quality and extreme cases, as a page to keep.
 
-use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
+use std::sync::Mutex;
 use std::time::Duration;
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
@@ -10,7 +10,7 @@ use spectroll::evaluation::report::{
     Effort, Options, Progress, Report, ReportError, Verdict, figures, measure, page,
 };
 use spectroll::output::{FolderMark, PendingFolder};
-use spectroll::{EngineChoice, adapters};
+use spectroll::{EngineChoice, EngineError, adapters};
 
 use super::exit::Usage;
 use super::interrupt::{self, Interrupted};
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     drop(folder()?);
     let options = Options {
         models,
-        engines: engines(arguments.engine.choice()),
+        engines: engines(arguments.engine.choice())?,
         effort: match (arguments.quick, arguments.full) {
             (true, _) => Effort::Quick,
             (_, true) => Effort::Full,
@@ -112,14 +112,14 @@ fn failures(Verdict { cases, checks, answers }: Verdict) -> String {
 }
 
 /// Every adapter and the CPU, unless one was asked for.
-fn engines(choice: Option<EngineChoice>) -> Vec<EngineChoice> {
-    match choice {
+fn engines(choice: Option<EngineChoice>) -> Result<Vec<EngineChoice>, EngineError> {
+    Ok(match choice {
         Some(choice) => vec![choice],
         None => {
-            let adapters = (0..adapters().len()).map(|i| EngineChoice::Adapter(i.to_string()));
+            let adapters = (0..adapters()?.len()).map(|i| EngineChoice::Adapter(i.to_string()));
             [EngineChoice::Cpu].into_iter().chain(adapters).collect()
         }
-    }
+    })
 }
 
 /// Display of progress.
@@ -152,7 +152,7 @@ fn watched(options: &Options, shown: Shown) -> anyhow::Result<Report> {
     if shown == Shown::Bar {
         bar.enable_steady_tick(Duration::from_millis(200));
     }
-    let last = RefCell::new(String::new());
+    let last = Mutex::new(String::new());
     let result = measure(options, &|progress: &Progress| {
         bar.set_position((1000.0 * progress.done) as u64);
         bar.set_prefix(HumanDuration(progress.left).to_string());
@@ -161,8 +161,9 @@ fn watched(options: &Options, shown: Shown) -> anyhow::Result<Report> {
             step => format!("{}: {step}", progress.section),
         };
         bar.set_message(message);
-        if shown == Shown::Lines && *last.borrow() != progress.section {
-            last.replace(progress.section.clone());
+        let mut last = last.lock().expect("no holder panics");
+        if shown == Shown::Lines && *last != progress.section {
+            last.clone_from(&progress.section);
             tell!("{}", line(progress));
         }
         interrupt::check().is_ok()

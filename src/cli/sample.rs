@@ -12,7 +12,7 @@ use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Model, Stream};
 use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, Purpose, RecipeArguments};
 use super::parse::{count, counted, seed};
-use super::run::{self, DryRun};
+use super::run::{self, DryRun, Waiting};
 use super::{interrupt, model_at};
 
 /// Draw spectra from a model
@@ -76,7 +76,7 @@ struct Report {
     seconds: f64,
     draws_per_second: f64,
     engine: String,
-    /// The engine alone, without why it is not another one.
+    /// The engine, with why it is not another one only where a variable is to blame.
     #[serde(skip)]
     drawn_by: String,
     version: &'static str,
@@ -84,9 +84,11 @@ struct Report {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = arguments.output.resolve(Purpose::of(arguments.dry_run))?;
+    let waiting = Waiting::begin("preparing the draws", arguments.quiet);
     let model = model_at(&arguments.model, arguments.wavelengths)?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
+    drop(waiting);
     let unnamed = Stream::new(arguments.seed);
     let stream = arguments.stream.as_ref().map_or(unnamed, |name| Stream::named(arguments.seed, name));
     if let (true, Some(name)) = (stream == unnamed, &arguments.stream) {
@@ -109,9 +111,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return Ok(output.check_space(&schema, &companions)?);
     }
     output.check_space(&schema, &companions)?;
-    let why = match (arguments.engine.choice().unwrap_or_default(), engine.adapter()) {
-        (EngineChoice::Auto, None) => ", no graphics hardware was found",
-        _ => "",
+    // Who has no graphics hardware knows; who hides it may not.
+    let hidden = std::env::var("WGPU_BACKEND").unwrap_or_default();
+    let (why, told) = match (arguments.engine.choice().unwrap_or_default(), engine.adapter()) {
+        (EngineChoice::Auto, None) if hidden.is_empty() => {
+            (", no graphics hardware was found".to_owned(), false)
+        }
+        (EngineChoice::Auto, None) => {
+            (format!(", no graphics hardware was found with WGPU_BACKEND={hidden}"), true)
+        }
+        _ => (String::new(), false),
     };
 
     let files = output.text_files(&schema, &companions);
@@ -142,7 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             seconds,
             draws_per_second: summary.draws as f64 / seconds,
             engine: format!("{engine}{why}"),
-            drawn_by: engine.to_string(),
+            drawn_by: if told { format!("{engine}{why}") } else { engine.to_string() },
             version: env!("CARGO_PKG_VERSION"),
         },
     )

@@ -9,7 +9,8 @@ use serde::Serialize;
 use spectroll::evaluation::plot::PictureFormat;
 use spectroll::export::{ArraySelection, Companions, ExportError, Output, SceneExport, Space, Writing};
 use spectroll::output::{OutputError, PendingFile, Schema, SetStatus};
-use spectroll::scene::{GroupSummary, PRESETS, Scene, Workload};
+use spectroll::plain_file::read_text;
+use spectroll::scene::{GroupSummary, MAX_FILE_BYTES, PRESETS, Scene, Workload};
 use spectroll::{Dtype, Engine, Quantity};
 
 use super::exit::Usage;
@@ -18,7 +19,7 @@ use super::options::{EngineArguments, OutputArguments, Purpose};
 use super::parse::{counted, grouped, seed, size};
 use super::picture;
 use super::picture::scene::Preview;
-use super::run::{self, folder_of};
+use super::run::{self, Waiting, folder_of};
 
 /// Draw scenes of lights, surfaces and targets, as a file says
 ///
@@ -108,10 +109,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let folder = arguments.file.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
     let selection = ArraySelection { only: arguments.only.clone(), arrays: arguments.arrays.clone() };
+    let waiting = Waiting::begin("preparing the scenes", arguments.quiet);
     let scene = selection.apply(match arguments.seed {
         Some(seed) => Scene::parse_seeded(&name, &text, folder, seed)?,
         None => Scene::parse(&name, &text, folder)?,
     })?;
+    drop(waiting);
     let scenes = arguments.scenes.clone().unwrap_or(0..scene.scenes());
     if scenes.end > scene.scenes() {
         let all = scene.scenes();
@@ -148,7 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 fn source(arguments: &Arguments) -> anyhow::Result<(String, String)> {
     match (&arguments.file, &arguments.example) {
         (Some(path), _) => {
-            let text = std::fs::read_to_string(path)
+            let text = read_text(path, MAX_FILE_BYTES)
                 .map_err(|e| Usage(format!("cannot read the scene file {path:?}: {e}")))?;
             Ok((path.display().to_string(), text))
         }

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
-use super::matrix::Matrix;
+use super::arrays::{self, Array};
+use super::reading::ReadOptions;
 use super::{SpectrumKind, Table, mat};
 use crate::grid::Grid;
 
@@ -68,8 +69,10 @@ impl BuiltinTable {
             BuiltinTable::Xyz1931 => ("T_xyz1931", include_bytes!("../../data/T_xyz1931.mat")),
             BuiltinTable::CieDaylight => ("B_cieday", include_bytes!("../../data/B_cieday.mat")),
         };
-        let mut table = mat::read(Path::new(self.name()), bytes, Some(variable))
-            .expect("compiled-in tables are readable");
+        let options = ReadOptions { array: Some(variable.to_owned()), ..ReadOptions::default() };
+        let path = Path::new(self.name());
+        let reading = mat::arrays(path, bytes).and_then(|arrays| arrays::choose(path, &arrays, &options));
+        let mut table = reading.expect("compiled-in tables are readable").table;
         table.name = self.name().to_owned();
         table.source = table.name.clone();
         if self == BuiltinTable::Munsell {
@@ -84,11 +87,11 @@ impl BuiltinTable {
 /// spectrum = power * (mean + components . (step * weights)).
 fn granada(name: &str) -> Table {
     let bytes = include_bytes!("../../data/granada_compact.mat");
-    let matrices = mat::matrices(Path::new(name), bytes).expect("compiled-in tables are readable").all;
+    let matrices = mat::arrays(Path::new(name), bytes).expect("compiled-in tables are readable").all;
     let matrix = |name: &str| {
-        let Matrix { rows, columns, values, .. } =
+        let Array { sides, values, .. } =
             matrices.iter().find(|m| m.name == name).expect("the file has every variable");
-        DMatrix::from_column_slice(*rows, *columns, values)
+        DMatrix::from_column_slice(sides[0], sides[1], values)
     };
     let mut spectra =
         matrix("granada_components") * (matrix("granada_weights") * matrix("granada_weight_step")[0]);

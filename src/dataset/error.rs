@@ -3,7 +3,34 @@
 use std::path::PathBuf;
 
 use super::MAX_BYTES;
+use super::units::WavelengthUnit;
 use crate::grid::{Grid, GridError};
+
+/// Setting of a reader or a fit that the message of an error advises.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Remedy {
+    /// None: the file is to be changed.
+    None,
+    /// A value that means "not measured" ([`ReadOptions::missing_values`](super::ReadOptions::missing_values)).
+    MissingValue(f64),
+    /// Spectra with missing values are left out ([`Table::without_missing`](super::Table::without_missing)).
+    Missing,
+    /// A factor for all values ([`Table::scaled`](super::Table::scaled)).
+    Scale(f64),
+    /// The unit of the wavelengths ([`ReadOptions::unit`](super::ReadOptions::unit)).
+    Unit(WavelengthUnit),
+    /// The direction of the spectra ([`ReadOptions::layout`](super::ReadOptions::layout)).
+    Layout,
+    /// The separator, the decimal sign, or the number of lines to skip.
+    Dialect,
+    /// The decimal sign ([`ReadOptions::decimal`](super::ReadOptions::decimal)).
+    Decimal,
+    /// The wavelengths of the measurements ([`ReadOptions::measured_at`](super::ReadOptions::measured_at)).
+    MeasuredAt,
+    /// The wavelengths of the model.
+    Wavelengths,
+}
 
 /// Error returned where data cannot be used: says what is wrong, where, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -16,44 +43,69 @@ pub enum DatasetError {
     TooLarge { path: PathBuf },
     #[error("{path:?} is empty")]
     Empty { path: PathBuf },
-    #[error("{path:?}: unknown type of file; expected .mat, .h5, .npy, .csv, .tsv or .txt")]
-    UnknownType { path: PathBuf },
-    #[error("{path:?} is not a readable MATLAB file: {reason}")]
-    Mat { path: PathBuf, reason: String },
-    #[error("{path:?} is not readable HDF5: {reason}")]
-    Hdf5 { path: PathBuf, reason: String },
-    #[error("{path:?} is not a readable NumPy array: {reason}")]
-    Npy { path: PathBuf, reason: String },
-    #[error("{path:?} does not say at which wavelengths its spectra are: give them, as start:step:stop")]
-    NoWavelengths { path: PathBuf },
-    #[error("{path:?}, line {line}: {reason}")]
-    Csv { path: PathBuf, line: u64, reason: String },
+    #[error("{path:?} is {found}, which is not read: {advice}")]
+    UnknownType { path: PathBuf, found: String, advice: &'static str },
+    #[error("{path:?} is not readable as {format}: {reason}")]
+    Format { path: PathBuf, format: &'static str, reason: String },
+    #[error("{path:?}, {place}: {reason}")]
+    Place { path: PathBuf, place: String, reason: String, remedy: Remedy },
+    #[error("{path:?}: {reason}")]
+    Layout { path: PathBuf, reason: String, remedy: Remedy },
+    #[error(
+        "{path:?} does not say at which wavelengths its {bands} bands are: give them, as start:step:stop"
+    )]
+    NoWavelengths { path: PathBuf, bands: usize },
     #[error(
         "{path:?} holds no matrix of spectra with its wavelengths beside it (X with S_X = [start step count], or a vector wavelength); it holds {found}"
     )]
     NoMatrix { path: PathBuf, found: String },
-    #[error("{path:?} holds several matrices of spectra: say which, as in {}:{}", path.display(), candidates[0])]
-    Ambiguous { path: PathBuf, candidates: Vec<String> },
+    #[error("{path:?} holds several {what}: say which, as in {}:{}", path.display(), candidates.join(&format!(" or {}:", path.display())))]
+    Ambiguous { path: PathBuf, what: &'static str, candidates: Vec<String> },
     #[error("{path:?} holds no matrix {variable:?} with its wavelengths beside it; it holds {found}")]
     NoVariable { path: PathBuf, variable: String, found: String },
-    #[error(
-        "{name}: {source} (text files have wavelengths in nm in their first column, and a spectrum in each other)"
-    )]
+    #[error("{name}: {source}")]
     Wavelengths { name: String, source: GridError },
-    #[error("{name}: {source}; the first column must hold the wavelengths: are the spectra in rows?")]
-    FirstColumn { name: String, source: GridError },
+    #[error("{name}: {reason}")]
+    NotWavelengths { name: String, reason: String, remedy: Remedy },
     #[error(
         "{name}: {values} values in spectrum {spectrum}, but {wavelengths} wavelengths: give one value for each"
     )]
     Length { name: String, spectrum: usize, values: usize, wavelengths: usize },
     #[error(
-        "spectrum {spectrum} of {name}: the value at {wavelength} nm is {value}; every value must be finite"
+        "spectrum {spectrum} of {name}: the value at {wavelength} nm is {value}; every value must be finite, or missing"
     )]
     NotFinite { name: String, spectrum: usize, wavelength: f64, value: f64 },
+    #[error(
+        "spectrum {spectrum} of {name}: the value at {wavelength} nm is missing (NaN); choose a grid without that wavelength, or leave out spectra with missing values"
+    )]
+    Missing { name: String, spectrum: usize, wavelength: f64 },
     #[error("{name} holds no spectra")]
     NoSpectra { name: String },
+    #[error("every spectrum of {name} lacks a value from {first} to {last} nm: none is left")]
+    NoneLeft { name: String, first: f64, last: f64 },
+    #[error("{place}: the value at {wavelength} nm is {value}{reason}")]
+    Value { place: String, wavelength: f64, value: f64, reason: String, remedy: Remedy },
+    #[error("{place}: {reason}")]
+    Spectrum { place: String, reason: String, remedy: Remedy },
     #[error(
         "{name} was measured from {first} to {last} nm, which does not cover the grid {grid}: choose a grid within it, or extrapolate (hold or zero)"
     )]
     Range { name: String, first: f64, last: f64, grid: Grid },
+}
+
+impl DatasetError {
+    /// Setting that the message advises.
+    pub fn remedy(&self) -> Remedy {
+        match self {
+            DatasetError::Place { remedy, .. }
+            | DatasetError::Layout { remedy, .. }
+            | DatasetError::NotWavelengths { remedy, .. }
+            | DatasetError::Value { remedy, .. }
+            | DatasetError::Spectrum { remedy, .. } => *remedy,
+            DatasetError::NoWavelengths { .. } => Remedy::MeasuredAt,
+            DatasetError::Missing { .. } => Remedy::Missing,
+            DatasetError::Range { .. } => Remedy::Wavelengths,
+            _ => Remedy::None,
+        }
+    }
 }

@@ -1,18 +1,37 @@
 //! Measured spectra: tables as they were measured, and the data set that a model is fitted to.
 //!
-//! A [`Table`] is what one file holds, at its own wavelengths. A [`Dataset`] is one or more tables on one grid. Both
-//! are checked when they are made, so nothing downstream meets a NaN or a ragged row.
+//! A [`Table`] is what one file holds, at its own wavelengths; a [`Reading`] also says how the file was read. A
+//! [`Dataset`] is one or more tables on one grid. Each reader delivers cells ([`sheet`]) or arrays with names ([`arrays`]),
+//! from which wavelengths and spectra are found in one place each; what is measured is judged ([`judge`]) before anything
+//! is made of it.
 
+mod arrays;
+mod axis;
 mod builtin;
-mod csv;
+mod envi;
 mod error;
+mod files;
+mod folder;
+mod format;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+mod jcamp;
+mod judge;
 mod mat;
-mod matrix;
 mod npy;
+mod npz;
+mod numbers;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod reading;
 mod resample;
+mod sheet;
+mod spdx;
+mod spreadsheet;
 mod table;
+mod text;
+mod units;
+mod zarr;
 
 use std::fmt;
 
@@ -21,12 +40,35 @@ use serde::{Deserialize, Serialize};
 
 use crate::grid::{Extrapolation, Grid};
 pub use builtin::BuiltinTable;
-pub use error::DatasetError;
+pub use error::{DatasetError, Remedy};
+pub use judge::{SpectraCounts, Unphysical};
+pub use reading::{Decimal, ReadOptions, Reading, Separator, TableLayout};
 use resample::resample;
 pub use table::Table;
+pub use units::WavelengthUnit;
 
 /// Limit on the bytes read of a file, and on those that a compressed file may unpack to: 512 MiB, 67 million values.
 const MAX_BYTES: u64 = 512 << 20;
+
+/// Limit on the values of a file.
+const MAX_VALUES: usize = MAX_BYTES as usize / size_of::<f64>();
+
+/// The reason of a refusal for size.
+fn too_many(values: usize) -> String {
+    format!("it holds {values} values, and {MAX_VALUES} are the most: split it, or keep only the spectra")
+}
+
+#[cfg(feature = "hdf5")]
+fn hdf5_bytes(path: &std::path::Path, bytes: Vec<u8>) -> Result<arrays::Arrays, DatasetError> {
+    hdf5::arrays(path, bytes)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn hdf5_bytes(path: &std::path::Path, _: Vec<u8>) -> Result<arrays::Arrays, DatasetError> {
+    let reason =
+        "this build leaves out HDF5: build it with the feature hdf5, or resave with save(file, '-v7')";
+    Err(format::not_built(path, "HDF5", reason))
+}
 
 /// Kind of spectrum: illuminants and reflectances have different physical limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,12 +102,13 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Resamples `tables` onto `grid` and joins them, in order. See [`Extrapolation`] for wavelengths outside a
-    /// table's.
+    /// Judges `tables`, resamples them onto `grid` and joins them, in order. See [`Extrapolation`] for wavelengths
+    /// outside a table's. Values that no measurement gives are an error.
     pub fn new(tables: &[Table], grid: Grid, extend: Extrapolation) -> Result<Dataset, DatasetError> {
         if tables.is_empty() {
             return Err(DatasetError::NoSpectra { name: "an empty list of tables".to_owned() });
         }
+        tables.iter().try_for_each(|table| judge::table(table, &grid))?;
         let columns: Vec<_> = tables.iter().map(|t| resample(t, grid, extend)).collect::<Result<_, _>>()?;
         let count = columns.iter().map(DMatrix::ncols).sum();
         let values = columns.iter().flat_map(|c| c.iter().copied());

@@ -20,6 +20,10 @@ pub(super) fn resample(
         let spline = Spline::new(table.wavelengths(), table.spectrum(j));
         for (value, wavelength) in column.iter_mut().zip(grid.wavelengths()) {
             *value = spline.at(wavelength, extend);
+            if value.is_nan() {
+                let (name, spectrum) = (table.name().to_owned(), j + 1);
+                return Err(DatasetError::Missing { name, spectrum, wavelength });
+            }
             if !value.is_finite() {
                 let (name, value) = (table.name().to_owned(), *value);
                 return Err(DatasetError::NotFinite { name, spectrum: j + 1, wavelength, value });

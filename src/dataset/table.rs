@@ -1,14 +1,15 @@
 //! Tables: what one file holds, as it was measured.
 
-use std::io::Read;
 use std::path::Path;
 
 use nalgebra::DMatrix;
 
-use super::{DatasetError, MAX_BYTES, SpectrumKind, csv, mat, npy};
+use super::reading::{ReadOptions, Reading};
+use super::{DatasetError, Remedy, SpectrumKind, axis, format};
 use crate::grid::{self, Grid};
 
-/// Spectra of one source, as measured: increasing wavelengths (nm), finite values.
+/// Spectra of one source, as measured: increasing wavelengths (nm), and values that are finite or NaN, which means "not
+/// measured".
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// Name in messages: a path and what it takes to find the spectra in that file.
@@ -22,7 +23,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// Makes a table of values, each spectrum as long as `wavelengths` (nm). `name` is its name in messages.
+    /// Makes a table of values, each spectrum as long as `wavelengths` (nm). NaN means "not measured". `name` is its name
+    /// in messages.
     pub fn new(name: &str, wavelengths: Vec<f64>, spectra: &[Vec<f64>]) -> Result<Table, DatasetError> {
         if let Some(i) = spectra.iter().position(|s| s.len() != wavelengths.len()) {
             return Err(DatasetError::Length {
@@ -51,7 +53,7 @@ impl Table {
             return Err(DatasetError::Wavelengths { name, source });
         }
         for (j, spectrum) in spectra.column_iter().enumerate() {
-            if let Some(i) = spectrum.iter().position(|v| !v.is_finite()) {
+            if let Some(i) = spectrum.iter().position(|v| v.is_infinite()) {
                 return Err(DatasetError::NotFinite {
                     name,
                     spectrum: j + 1,
@@ -63,44 +65,100 @@ impl Table {
         Ok(Table { source: name.clone(), name, wavelengths, spectra, kind: None })
     }
 
-    /// Reads a MATLAB file or an `.h5` one, or a `.csv`, `.tsv` or `.txt` file with the wavelengths in the first column
-    /// and a spectrum in each other one. `variable` picks a matrix where a `.mat` or `.h5` file holds several.
+    /// Makes a table of wavelengths in nm that may fall, which is noted, and that are checked to be such.
+    pub(super) fn from_measured(
+        name: &str,
+        mut wavelengths: Vec<f64>,
+        mut spectra: DMatrix<f64>,
+        notes: &mut Vec<String>,
+    ) -> Result<Table, DatasetError> {
+        if let Err(fault) = axis::check(&wavelengths) {
+            let remedy = fault.guess().map_or(Remedy::None, Remedy::Unit);
+            let reason = format!("its wavelengths are none: {fault}");
+            return Err(DatasetError::NotWavelengths { name: name.to_owned(), reason, remedy });
+        }
+        if wavelengths[0] > wavelengths[wavelengths.len() - 1] {
+            wavelengths.reverse();
+            let bands = wavelengths.len();
+            for mut spectrum in spectra.column_iter_mut() {
+                for band in 0..bands / 2 {
+                    spectrum.swap_rows(band, bands - 1 - band);
+                }
+            }
+            notes.push("the wavelengths fall, and were turned round".to_owned());
+        }
+        Table::from_columns(name, wavelengths, spectra)
+    }
+
+    /// Reads a file of spectra in any format that is read. `variable` picks a matrix where a file holds several.
     pub fn open(path: impl AsRef<Path>, variable: Option<&str>) -> Result<Table, DatasetError> {
         Table::open_on(path, variable, None)
     }
 
-    /// Reads a table as [`Table::open`] does, and also `.npy` files with spectra in rows, whose wavelengths are
-    /// `grid`.
+    /// Reads a table as [`Table::open`] does, and also files whose spectra have no wavelengths, which are those of `grid`.
     pub fn open_on(
         path: impl AsRef<Path>,
         variable: Option<&str>,
         grid: Option<Grid>,
     ) -> Result<Table, DatasetError> {
+        let options = ReadOptions {
+            array: variable.map(str::to_owned),
+            fallback: grid.map(|grid| grid.wavelengths().collect()),
+            ..ReadOptions::default()
+        };
+        Table::read(path, &options).map(|reading| reading.table)
+    }
+
+    /// Reads a file of spectra, and says how it was read.
+    pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Reading, DatasetError> {
         let path = path.as_ref();
-        let bytes = read_capped(path)?;
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        let mut table = match extension.as_str() {
-            "mat" | "h5" | "hdf5" => mat::read(path, &bytes, variable),
-            "npy" => npy::read(path, &bytes, grid),
-            "csv" | "tsv" | "txt" => csv::read(path, &bytes),
-            _ => Err(DatasetError::UnknownType { path: path.to_owned() }),
-        }?;
+        let mut reading = format::read(path, options)?;
+        let table = &mut reading.table;
         let (full, file) =
             (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy());
         table.source = table.name.replace(&format!("{full:?}"), &file);
-        Ok(table)
+        let mut marked = 0;
+        for value in table.spectra.iter_mut() {
+            // NaN is missing already.
+            if options.missing_values.iter().any(|missing| close(*missing, *value)) {
+                *value = f64::NAN;
+                marked += 1;
+            }
+        }
+        if !options.missing_values.is_empty() {
+            reading.notes.push(format!("{marked} values were marked as missing, as asked for"));
+        }
+        Ok(reading)
     }
 
     /// Whether the name of a file is that of a table, by its extension.
     pub fn may_open(path: &Path) -> bool {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        matches!(extension.as_str(), "mat" | "h5" | "hdf5" | "npy" | "csv" | "tsv" | "txt")
+        format::may_open(path)
     }
 
     /// Spectra multiplied by `factor`: 0.01 makes reflectances of percentages.
     pub fn scaled(mut self, factor: f64) -> Table {
         self.spectra *= factor;
         self
+    }
+
+    /// Number of values that are missing (NaN).
+    pub fn missing(&self) -> usize {
+        self.spectra.iter().filter(|v| v.is_nan()).count()
+    }
+
+    /// Leaves out the spectra that lack a value that a grid from `first` to `last` (nm) needs: within it, or next to an end
+    /// that was not measured. Also returns how many they are.
+    pub fn without_missing(mut self, first: f64, last: f64) -> Result<(Table, usize), DatasetError> {
+        let start = self.wavelengths.partition_point(|&w| w <= first).saturating_sub(1);
+        let end = self.wavelengths.partition_point(|&w| w < last).min(self.wavelengths.len() - 1);
+        let lacks = |j: &usize| (start..=end.max(start)).any(|i| self.spectra[(i, *j)].is_nan());
+        let gone: Vec<usize> = (0..self.spectra.ncols()).filter(lacks).collect();
+        if gone.len() == self.spectra.ncols() {
+            return Err(DatasetError::NoneLeft { name: self.name, first, last });
+        }
+        self.spectra = self.spectra.remove_columns_at(&gone);
+        Ok((self, gone.len()))
     }
 
     /// Name of the table in messages.
@@ -125,21 +183,14 @@ impl Table {
         self.spectra.ncols()
     }
 
-    /// The values of one spectrum, one per wavelength.
+    /// The values of one spectrum, one per wavelength; NaN where it was not measured.
     pub fn spectrum(&self, index: usize) -> &[f64] {
         let bands = self.wavelengths.len();
         &self.spectra.as_slice()[index * bands..(index + 1) * bands]
     }
 }
 
-fn read_capped(path: &Path) -> Result<Vec<u8>, DatasetError> {
-    let failed = |source| DatasetError::Read { path: path.to_owned(), source };
-    let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(failed)?;
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
-    match bytes.len() as u64 {
-        0 => Err(DatasetError::Empty { path: path.to_owned() }),
-        n if n > MAX_BYTES => Err(DatasetError::TooLarge { path: path.to_owned() }),
-        _ => Ok(bytes),
-    }
+/// Whether a value is a marker: as close as single precision has it, since -1.23e34 of a file of such is no other number.
+fn close(marker: f64, value: f64) -> bool {
+    (value - marker).abs() <= 1e-6 * marker.abs()
 }

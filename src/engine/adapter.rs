@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::EngineError;
+use super::{EngineError, WantedAdapter};
 
 /// A graphics adapter, as its driver describes itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -47,10 +47,33 @@ impl Adapter {
     }
 }
 
+/// The variable that limits adapters to some interfaces.
+const BACKEND: &str = "WGPU_BACKEND";
+
 /// Lists the adapters of this machine, in the order in which [`EngineChoice::Adapter`](super::EngineChoice::Adapter)
-/// counts them. The variable `WGPU_BACKEND` limits them to some interfaces.
-pub fn adapters() -> Vec<Adapter> {
-    enumerate().iter().map(Adapter::of).collect()
+/// counts them. The variable `WGPU_BACKEND` limits them to some interfaces; an error says where it names none.
+pub fn adapters() -> Result<Vec<Adapter>, EngineError> {
+    Ok(enumerate()?.iter().map(Adapter::of).collect())
+}
+
+/// The value of a variable; `None` also where that is empty, which shells make of one that is to be unset.
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.trim().is_empty())
+}
+
+/// The interfaces that this build can reach adapters by.
+pub(super) fn compiled() -> String {
+    let names = wgpu::Instance::enabled_backend_features().iter_names();
+    let names: Vec<_> = names.map(|(name, _)| name.to_lowercase()).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+/// What to do where no adapter was found.
+pub(super) fn remedy() -> String {
+    match variable(BACKEND) {
+        Some(value) => format!("the variable {BACKEND} is {value:?} and hides all others, unset it"),
+        None => "install a Vulkan driver (Debian: mesa-vulkan-drivers)".to_owned(),
+    }
 }
 
 /// Kinds of adapter to choose from.
@@ -62,8 +85,8 @@ pub(super) enum Wanted {
 
 /// The adapter named by `WGPU_ADAPTER_NAME`, if that is set; else the best: discrete, integrated, virtual, software.
 pub(super) fn best(which: Wanted) -> Result<Option<wgpu::Adapter>, EngineError> {
-    if let Some(wanted) = std::env::var("WGPU_ADAPTER_NAME").ok().filter(|name| !name.is_empty()) {
-        return find(&wanted).map(Some);
+    if let Some(name) = variable("WGPU_ADAPTER_NAME") {
+        return find(WantedAdapter { name, is_from_variable: true }).map(Some);
     }
     let will_do = |adapter: &wgpu::Adapter| {
         which == Wanted::Any || adapter.get_info().device_type != wgpu::DeviceType::Cpu
@@ -75,16 +98,16 @@ pub(super) fn best(which: Wanted) -> Result<Option<wgpu::Adapter>, EngineError> 
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
     };
-    Ok(enumerate().into_iter().filter(will_do).min_by_key(rank)) // the first of the best
+    Ok(enumerate()?.into_iter().filter(will_do).min_by_key(rank)) // the first of the best
 }
 
 /// Finds the adapter with an index, or the one whose name holds a text.
-pub(super) fn find(wanted: &str) -> Result<wgpu::Adapter, EngineError> {
-    let all = enumerate();
+pub(super) fn find(wanted: WantedAdapter) -> Result<wgpu::Adapter, EngineError> {
+    let all = enumerate()?;
     let found: Vec<_> = all.iter().map(Adapter::of).collect();
-    match position(wanted, &found) {
+    match position(&wanted.name, &found) {
         Some(position) => Ok(all[position].clone()),
-        None => Err(EngineError::NoAdapter { wanted: wanted.to_owned(), found }),
+        None => Err(EngineError::NoAdapter { wanted, found }),
     }
 }
 
@@ -98,12 +121,18 @@ fn position(wanted: &str, all: &[Adapter]) -> Option<usize> {
     all.iter().position(|adapter| adapter.name.to_lowercase().contains(&wanted))
 }
 
-fn enumerate() -> Vec<wgpu::Adapter> {
+fn enumerate() -> Result<Vec<wgpu::Adapter>, EngineError> {
     let compiled = wgpu::Instance::enabled_backend_features();
-    if compiled.is_empty() {
-        return Vec::new(); // a library build without back ends; wgpu would panic
+    let mut backends = compiled;
+    if let Some(value) = variable(BACKEND) {
+        if value.split(',').any(|name| wgpu::Backends::from_comma_list(name).is_empty()) {
+            return Err(EngineError::UnknownBackend { value });
+        }
+        backends &= wgpu::Backends::from_comma_list(&value);
     }
-    let backends = wgpu::Backends::from_env().unwrap_or(compiled) & compiled;
+    if backends.is_empty() {
+        return Ok(Vec::new()); // wgpu would panic
+    }
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends,
         flags: wgpu::InstanceFlags::empty().with_env(),
@@ -113,7 +142,8 @@ fn enumerate() -> Vec<wgpu::Adapter> {
         let flags = adapter.get_downlevel_capabilities().flags;
         flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
     };
-    pollster::block_on(instance.enumerate_adapters(backends)).into_iter().filter(compute).collect()
+    let all = pollster::block_on(instance.enumerate_adapters(backends));
+    Ok(all.into_iter().filter(compute).collect())
 }
 
 #[cfg(test)]

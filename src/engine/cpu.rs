@@ -1,6 +1,7 @@
 //! The CPU engine: one thread keeps all cores on the next window while the caller has the last.
 
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
@@ -9,6 +10,7 @@ use super::{Batch, EngineError};
 use crate::cpu::{self, Kernel};
 use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::Draws;
+use crate::threads;
 
 /// Number of windows: one with the caller, one being computed, one between them.
 const WINDOWS: usize = 3;
@@ -19,7 +21,7 @@ pub(super) enum Threads {
     /// The thread of the caller alone.
     Caller,
     /// Threads of the engine's own: those of a caller might all be waiting for their draws.
-    Pool(rayon::ThreadPool),
+    Pool(Arc<rayon::ThreadPool>),
 }
 
 impl Threads {
@@ -28,9 +30,16 @@ impl Threads {
         if count.is_some_and(|count| count.get() == 1) {
             return Ok(Threads::Caller);
         }
-        let builder = rayon::ThreadPoolBuilder::new().num_threads(count.map_or(0, NonZeroUsize::get));
-        let pool = builder.build().map_err(|e| EngineError::Threads(e.to_string()))?;
-        Ok(if pool.current_num_threads() == 1 { Threads::Caller } else { Threads::Pool(pool) })
+        let pool = threads::pool(count)?;
+        Ok(if pool.current_num_threads() == 1 { Threads::Caller } else { Threads::Pool(Arc::new(pool)) })
+    }
+
+    /// A pool for work that is not drawing: the threads that draw, or one for a thread of the caller's.
+    pub(super) fn pool(&self) -> Result<Arc<rayon::ThreadPool>, EngineError> {
+        match self {
+            Threads::Caller => Ok(Arc::new(threads::pool(Some(NonZeroUsize::MIN))?)),
+            Threads::Pool(pool) => Ok(pool.clone()),
+        }
     }
 
     pub(super) fn count(&self) -> usize {
@@ -118,7 +127,8 @@ impl<'a> CpuSchedule<'a> {
         }
         let (threads, pace) = (self.threads, &mut self.pace);
         std::thread::scope(|scope| {
-            let computing = scope.spawn(move || compute(threads, jobs, pace, (draws, steps), emptied, full));
+            let work = move || compute(threads, jobs, pace, (draws, steps), emptied, full);
+            let computing = threads::spawn_scoped(scope, work).map_err(EngineError::from)?;
             // Dropped before the thread is waited for, which might itself be waiting for a window.
             let empty = empty;
             for (window, room) in filled {

@@ -114,6 +114,8 @@ pub(super) struct GpuSchedule<'a> {
     slots: Vec<Slot>,
     /// Number of steps that each slot has room for.
     capacity: u64,
+    /// A schedule of each job's draws as steps of their own, where a step of some job is too large for a dispatch.
+    parts: Vec<GpuSchedule<'a>>,
 }
 
 /// A job of the schedule, with its compute pipeline.
@@ -135,15 +137,29 @@ impl<'a> GpuSchedule<'a> {
         }
         let limits = gpu.device.limits();
         let most = roles.iter().map(|role| role.sampler.max_count(&limits) / role.per_step).min();
-        let pace = Pace::new(
-            jobs,
-            roles.iter().map(|role| role.sampler.formats()),
-            most.expect("an ensemble has jobs"),
-        );
-        Ok(GpuSchedule { gpu, jobs: roles, pace, slots: Vec::new(), capacity: 0 })
+        let most = most.expect("an ensemble has jobs");
+        let single = |job: &Job| GpuSchedule::new(gpu, &[Job { per_step: 1, ..*job }], indexing);
+        let is_too_large = most == 0 && jobs.iter().any(|job| job.per_step > 1);
+        let parts =
+            if is_too_large { jobs.iter().map(single).collect::<Result<_, _>>()? } else { Vec::new() };
+        let pace = Pace::new(jobs, roles.iter().map(|role| role.sampler.formats()), most);
+        Ok(GpuSchedule { gpu, jobs: roles, pace, slots: Vec::new(), capacity: 0, parts })
     }
 
     pub(super) fn draw<E: From<EngineError>>(
+        &mut self,
+        draws: &[Draws],
+        steps: u64,
+        sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match self.parts.is_empty() {
+            true => self.draw_windows(draws, steps, sink),
+            false => self.draw_in_parts(draws, steps, sink),
+        }
+    }
+
+    /// Draws windows of whole steps.
+    fn draw_windows<E: From<EngineError>>(
         &mut self,
         draws: &[Draws],
         steps: u64,
@@ -176,6 +192,41 @@ impl<'a> GpuSchedule<'a> {
             last_end = Some(Instant::now());
             self.slots.push(flight.read(sink)?);
         }
+    }
+
+    /// Draws each step in as many dispatches as it takes, and hands it over as a whole.
+    fn draw_in_parts<E: From<EngineError>>(
+        &mut self,
+        draws: &[Draws],
+        steps: u64,
+        sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for offset in 0..steps {
+            let window = Window { offset, steps: 1 };
+            let mut all = Vec::new();
+            for ((part, job), draws) in self.parts.iter_mut().zip(&self.jobs).zip(draws) {
+                let range = window.of(*draws, job.per_step);
+                let formats = job.sampler.formats();
+                let mut arrays = vec![Vec::new(); formats.len()];
+                part.draw_windows::<EngineError>(&[range], range.count(), &mut |batches: &[Batch]| {
+                    for (array, format) in arrays.iter_mut().zip(formats) {
+                        array.extend_from_slice(batches[0].bytes(format.quantity));
+                    }
+                    Ok(())
+                })?;
+                all.push((range, formats, arrays));
+            }
+            let mut batches = Vec::new();
+            for (range, formats, arrays) in &all {
+                batches.push(Batch::new(
+                    range.range,
+                    formats,
+                    arrays.iter().map(|array: &Vec<u8>| array.as_slice()),
+                ));
+            }
+            sink(&batches)?;
+        }
+        Ok(())
     }
 
     /// Allocates slots for windows of this number of steps. An error while drawing loses some of them.

@@ -13,6 +13,7 @@ mod session;
 use std::fmt;
 use std::num::NonZeroUsize;
 use std::ops::AddAssign;
+use std::sync::Arc;
 
 use half::f16;
 use serde::Serialize;
@@ -27,6 +28,7 @@ use crate::quantity::{ArrayFormat, Dtype, Quantity};
 use crate::random::stream::{DrawRange, Draws};
 use crate::recipe::Recipe;
 use crate::sampler::SamplerError;
+use crate::threads::{self, ThreadError};
 
 /// Choice of where to draw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -49,15 +51,19 @@ pub enum EngineChoice {
 #[allow(missing_docs)] // the messages say what the fields are
 pub enum EngineError {
     #[error("no adapter {}; {}", named(wanted), available(found))]
-    NoAdapter { wanted: String, found: Vec<Adapter> },
-    #[error(
-        "no graphics adapter was found: install a Vulkan driver (Debian: mesa-vulkan-drivers), or draw on the CPU"
-    )]
+    NoAdapter { wanted: WantedAdapter, found: Vec<Adapter> },
+    #[error("no graphics adapter was found: {}, or draw on the CPU", adapter::remedy())]
     NoAdapters,
+    #[error(
+        "the variable WGPU_BACKEND is {value:?}, and the interfaces are vulkan, metal, dx12 and gl, of which this build \
+         has {}: unset it, or name one of them",
+        adapter::compiled()
+    )]
+    UnknownBackend { value: String },
     #[error("adapter {adapter}: {reason}")]
     Gpu { adapter: String, reason: String },
-    #[error("cannot start the threads to draw with: {0}; ask for fewer")]
-    Threads(String),
+    #[error(transparent)]
+    Threads(#[from] ThreadError),
     #[error(transparent)]
     Range(#[from] SamplerError),
     #[error(
@@ -72,14 +78,25 @@ pub enum EngineError {
     ExhaustedInScene { group: String, scene: u64, element: u64, attempts: u32 },
 }
 
+/// The index or the name of an adapter, and who asked for it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WantedAdapter {
+    /// The index, or part of the name.
+    pub name: String,
+    /// Whether the variable `WGPU_ADAPTER_NAME` asked for it, and not the caller.
+    pub is_from_variable: bool,
+}
+
 /// An index as it stands, and a name in quotes.
-fn named(wanted: &str) -> String {
-    if wanted.bytes().all(|b| b.is_ascii_digit()) { wanted.to_owned() } else { format!("{wanted:?}") }
+fn named(wanted: &WantedAdapter) -> String {
+    let WantedAdapter { name, is_from_variable } = wanted;
+    let name = if name.bytes().all(|b| b.is_ascii_digit()) { name.to_owned() } else { format!("{name:?}") };
+    if *is_from_variable { format!("{name}, as the variable WGPU_ADAPTER_NAME asks for") } else { name }
 }
 
 fn available(found: &[Adapter]) -> String {
     match found {
-        [] => "this machine has none".to_owned(),
+        [] => format!("there is none: {}", adapter::remedy()),
         [only] => format!("there is only 0: {only}"),
         all => {
             let lines = all.iter().enumerate().map(|(i, a)| format!("\n  {i}: {a}"));
@@ -238,7 +255,9 @@ impl Engine {
             EngineChoice::Cpu => None,
             EngineChoice::Auto => adapter::best(Wanted::Hardware)?,
             EngineChoice::Gpu => Some(adapter::best(Wanted::Any)?.ok_or(EngineError::NoAdapters)?),
-            EngineChoice::Adapter(wanted) => Some(adapter::find(wanted)?),
+            EngineChoice::Adapter(wanted) => {
+                Some(adapter::find(WantedAdapter { name: wanted.clone(), is_from_variable: false })?)
+            }
         };
         let device = match adapter {
             Some(adapter) => Device::Gpu(gpu::Gpu::open(adapter)?),
@@ -252,6 +271,14 @@ impl Engine {
         match &self.device {
             Device::Gpu(gpu) => Some(gpu.adapter()),
             Device::Cpu(_) => None,
+        }
+    }
+
+    /// Threads for work that no device does: the engine's own, where it has any.
+    pub(crate) fn pool(&self) -> Result<Arc<rayon::ThreadPool>, EngineError> {
+        match &self.device {
+            Device::Gpu(_) => Ok(Arc::new(threads::pool(None)?)),
+            Device::Cpu(threads) => threads.pool(),
         }
     }
 

@@ -138,7 +138,7 @@ impl Output {
             Destination::Stdout(format) if !format.is_streamed() => Err(OutputError::NotStreamed),
             Destination::Stdout(format) | Destination::File(format) => file(format),
             Destination::SpdFolder => file(FileFormat::Spd),
-            Destination::Set(chunks) => chunks.check(&self.path, schema),
+            Destination::Set(_) => self.plan(schema).expect("the destination is a set").check(&self.path),
         }
     }
 

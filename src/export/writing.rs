@@ -7,7 +7,8 @@ use std::path::PathBuf;
 use super::{Companions, Destination, Output, Rows};
 use crate::engine::{Engine, EngineError};
 use crate::output::{
-    FileWriter, OutputError, Schema, SetStatus, SetWriter, Sidecar, SpdFolder, StreamWriter,
+    FileWriter, IfExists, OutputError, PendingFile, Schema, SetStatus, SetWriter, Sidecar, SpdFolder,
+    StreamWriter,
 };
 
 /// Error that ended an export before its data set was complete.
@@ -86,6 +87,8 @@ impl Writing {
                 let file = FileWriter::create(path, format, &schema, &companions.spectra, if_exists)?;
                 let sidecar = match output.has_sidecar {
                     true => {
+                        // Only to learn now whether it can be made.
+                        PendingFile::create(Sidecar::path(path), IfExists::Replace)?;
                         let model = companions.files.iter().find(|(name, _)| *name == "_model.json");
                         let model = model.map(|(_, text)| text.as_str());
                         Some(Box::new(Sidecar::new(format, &schema, rows.rounding()?, model)))

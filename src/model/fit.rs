@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::decomposition::Decomposition;
-use crate::dataset::{Dataset, SpectrumKind};
+use crate::dataset::{Dataset, SpectrumKind, Unphysical};
 use crate::grid::Grid;
 use crate::model::{MAX_COMPONENTS, Model, ModelParts, Normalization};
 
@@ -57,6 +57,8 @@ pub enum FitError {
          them by 100; or fit them as illuminants"
     )]
     NotReflectances { mean: f64 },
+    #[error(transparent)]
+    Unphysical(#[from] Unphysical),
     #[error("the principal components of these data could not be found to 1e-10: please report the data")]
     Decomposition,
     #[error("the values are too large or too small to square in f64: rescale the data, or normalise")]
@@ -105,6 +107,9 @@ impl Fit {
         let mean = centred.mean();
         if self.kind == SpectrumKind::Reflectance && mean.is_finite() && mean > 1.0 {
             return Err(FitError::NotReflectances { mean });
+        }
+        if centred.iter().all(|v| v.is_finite()) {
+            data.judge(self.kind)?;
         }
         let mean = centred.column_mean(); // eq. 2, 6
         centred.column_iter_mut().for_each(|mut spectrum| spectrum -= &mean);
@@ -299,7 +304,9 @@ mod tests {
                 Dataset::new(&[table], Grid::new(400.0, 10.0, 4).unwrap(), Extrapolation::Error).unwrap();
             let fit =
                 Fit::new(SpectrumKind::Reflectance).components(2).normalization(normalization).fit(&data);
-            assert!(matches!(fit, Err(FitError::Scale | FitError::Power { .. })), "{size:e}: {fit:?}");
+            let expected =
+                matches!(fit, Err(FitError::Scale | FitError::Power { .. } | FitError::Unphysical(_)));
+            assert!(expected, "{size:e}: {fit:?}");
         }
     }
 }

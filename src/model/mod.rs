@@ -3,7 +3,6 @@
 //! A model is checked when it is made, whether by a fit, from a file or by hand, so what holds one may rely on its
 //! shapes, on an orthonormal basis and on a covariance that has a square root.
 
-use std::fs;
 use std::path::Path;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -18,10 +17,14 @@ pub use fit::{Fit, FitError};
 
 use crate::dataset::{SpectrumKind, Table};
 use crate::grid::{Grid, GridError};
+use crate::plain_file;
 
 /// The most components a model may have: what the counter layout of a draw has blocks for (see
 /// [`Stream::block`](crate::Stream::block)).
 pub const MAX_COMPONENTS: usize = 1000;
+
+/// The largest model file that is read, in bytes: 1,000 components of 10,000 bands have some 200 MB.
+const MAX_FILE_BYTES: u64 = 512 << 20;
 
 /// The version of the file format that this program writes, and the newest that it reads.
 const SCHEMA: u32 = 1;
@@ -102,6 +105,10 @@ pub enum ModelError {
     NotOrthonormal { row: usize, column: usize, product: f64, expected: f64 },
     #[error("powers holds {0}; what spectra are divided by is finite and above 0")]
     Power(f64),
+    #[error(
+        "explained_variance holds {0}: each is a share of the data's variance, at least 0, and together they are at most 1"
+    )]
+    ExplainedVariance(f64),
     #[error("weight_covariance is not symmetric: entries {row},{column} and {column},{row} differ")]
     NotSymmetric { row: usize, column: usize },
     #[error(
@@ -145,6 +152,13 @@ impl Model {
             let found = parts.weight_covariance.nrows();
             return Err(ModelError::Shape { field: "a column of weight_covariance", found, expected: k });
         }
+        let mut explained = 0.0;
+        for &share in &parts.explained_variance {
+            explained += share;
+            if share < 0.0 || explained > 1.0 + 1e-9 {
+                return Err(ModelError::ExplainedVariance(share));
+            }
+        }
         if let Some(&value) = parts.powers.iter().find(|power| !(power.is_finite() && **power > 0.0)) {
             return Err(ModelError::Power(value));
         }
@@ -162,8 +176,8 @@ impl Model {
         if Table::may_open(path) {
             return Err(ModelError::Data { path: name });
         }
-        let text =
-            fs::read_to_string(path).map_err(|source| ModelError::Read { path: name.clone(), source })?;
+        let text = plain_file::read_text(path, MAX_FILE_BYTES)
+            .map_err(|source| ModelError::Read { path: name.clone(), source })?;
         Model::from_json(&name, &text)
     }
 

@@ -27,6 +27,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::quantity::Dtype;
+use crate::threads::ThreadError;
 
 pub use byte_count::ByteCount;
 pub(crate) use pending::available_space;
@@ -86,9 +87,11 @@ pub enum OutputError {
     NoFolder { folder: PathBuf },
     #[error("cannot write {path:?}: {source}")]
     Write { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Threads(#[from] ThreadError),
     #[error("cannot read {path:?}: {source}")]
     Read { path: PathBuf, source: io::Error },
-    #[error("{path:?}: {format} files hold {holds}; {remedy}")]
+    #[error("{path:?}: {format} hold {holds}; {remedy}")]
     Cannot { path: PathBuf, format: &'static str, holds: &'static str, remedy: &'static str },
     #[error("{path:?}: this build leaves out {what}: build it with the feature {feature}")]
     NotBuilt { path: PathBuf, what: &'static str, feature: &'static str },
@@ -97,6 +100,13 @@ pub enum OutputError {
          delete: choose another format, or write it anyway"
     )]
     ManyFiles { path: PathBuf, count: u64 },
+    #[error("{path:?} would be a set of {chunks} chunks, and a set has at most a million: make them larger")]
+    ManyChunks { path: PathBuf, chunks: u64 },
+    #[error(
+        "{path:?} would have chunks of {rows} draws, {bytes} each, of which four are in memory at once: let a chunk have \
+         at most {most}"
+    )]
+    LargeChunks { path: PathBuf, rows: u64, bytes: ByteCount, most: u64 },
     #[error("standard output takes CSV and .npy alone: choose one of them, or name a file")]
     NotStreamed,
     #[error("{} needs {bound}{needs} and {free} are free here", path.display())]
@@ -204,27 +214,29 @@ impl FileFormat {
         let cannot = |format, holds, remedy| Err(OutputError::Cannot { path, format, holds, remedy });
         let of_scenes = schema.row == "scene";
         match self {
-            FileFormat::Npy | FileFormat::Csv | FileFormat::Parquet if shares => {
-                cannot("these", "what each draw has", "repeat what all share, or name it .npz, .zarr or .h5")
-            }
+            FileFormat::Npy | FileFormat::Csv | FileFormat::Parquet if shares => cannot(
+                "these files",
+                "what each draw has",
+                "repeat what all share, or name it .npz, .zarr or .h5",
+            ),
             FileFormat::Npy if !one && of_scenes => {
                 let remedy = "choose one array, or name it .npz, .zarr, .h5 or .parquet";
-                cannot(".npy", "one array", remedy)
+                cannot(".npy files", "one array", remedy)
             }
             FileFormat::Npy if !one => {
                 let remedy = "choose one quantity, or name it .npz, .zarr, .h5 or .parquet";
-                cannot(".npy", "one array", remedy)
+                cannot(".npy files", "one array", remedy)
             }
             FileFormat::Spd if !spd::holds(schema, spectra) => {
                 let scene = "choose the spectra of one group or more";
-                cannot(".spd", "spectra", if of_scenes { scene } else { "choose spectra alone" })
+                cannot(".spd files", "spectra", if of_scenes { scene } else { "choose spectra alone" })
             }
-            FileFormat::Spd if !singles => cannot(".spd", "f32 alone, as text", "leave out the type"),
+            FileFormat::Spd if !singles => cannot(".spd files", "f32 alone, as text", "leave out the type"),
             FileFormat::Mat if !mat::has_names(schema, spectra) => {
-                cannot(".mat", "names of up to 63 letters, digits and _, each once", "rename the group")
+                cannot(".mat files", "names of up to 63 letters, digits and _, each once", "rename the group")
             }
-            FileFormat::Mat if halves => cannot(".mat", "f32 and f64", "choose one of them"),
-            FileFormat::Parquet if halves => cannot(".parquet", "f32 and f64", "choose one of them"),
+            FileFormat::Mat if halves => cannot(".mat files", "f32 and f64", "choose one of them"),
+            FileFormat::Parquet if halves => cannot(".parquet files", "f32 and f64", "choose one of them"),
             _ => Ok(()),
         }
     }
@@ -233,7 +245,14 @@ impl FileFormat {
 impl ChunkFormat {
     /// Returns an error where the format cannot hold a schema, or was left out of this build.
     pub fn check(self, path: &Path, schema: &Schema) -> Result<(), OutputError> {
+        let cannot = |holds, remedy| {
+            Err(OutputError::Cannot { path: path.to_owned(), format: "sets of chunks", holds, remedy })
+        };
         match self {
+            _ if schema.fields.is_empty() => cannot(
+                "what differs from scene to scene",
+                "choose another array, or name it .npz, .h5 or .mat",
+            ),
             ChunkFormat::Zarr { zstd: Some(_) } if !cfg!(feature = "zstd") => {
                 Err(OutputError::NotBuilt { path: path.to_owned(), what: "Zstandard", feature: "zstd" })
             }

@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::pending::{PendingFile, folder, ignore_missing, place, sync_folder};
 use super::set::check::check_schema;
-use super::sum::{Sum, is_signed, regular, signed};
+use super::sum::{LARGEST, Sum, is_signed, signed};
 use super::{FileFormat, OutputError, Schema};
+use crate::plain_file::read_text;
 
 /// Version of the sidecar that this program writes and reads.
 const VERSION: u32 = 1;
@@ -61,7 +62,7 @@ impl Sidecar {
     pub fn load(file: &Path) -> Result<Sidecar, OutputError> {
         let path = Sidecar::path(file);
         let failed = |reason: String| OutputError::Manifest { path: path.clone(), reason };
-        let text = match regular(&path) {
+        let text = match read_text(&path, LARGEST) {
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 return Err(OutputError::NoSidecar { path: file.to_owned() });
             }

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-/// Largest text that is read, in bytes.
-const LARGEST: u64 = 1 << 30;
+/// Largest manifest that is read, in bytes.
+pub(super) const LARGEST: u64 = 1 << 30;
 
 /// Bytes of a file that are summed at once.
 const BUFFER: usize = 1 << 20;
@@ -88,18 +88,4 @@ pub(super) fn signed(value: &impl Serialize) -> String {
 pub(super) fn is_signed(text: &str, sum: &str) -> bool {
     let unsigned = text.strip_suffix(&format!("{sum}{END}")).map(|start| format!("{start}{END}"));
     unsigned.is_some_and(|unsigned| blake3::hash(unsigned.as_bytes()).to_hex().as_str() == sum)
-}
-
-/// Text of a plain file of no more than [`LARGEST`] bytes.
-pub(super) fn regular(path: &Path) -> io::Result<String> {
-    let found = fs::metadata(path)?;
-    if !found.is_file() {
-        return Err(io::Error::other("it is not a plain file"));
-    }
-    if found.len() > LARGEST {
-        return Err(io::Error::other(format!("it has {} bytes, and no such file has", found.len())));
-    }
-    let mut text = String::new();
-    File::open(path)?.take(LARGEST).read_to_string(&mut text)?;
-    Ok(text)
 }

@@ -1,9 +1,9 @@
 //! Pilot run, which estimates the acceptance before any work starts.
 
 use crate::cpu::Kernel;
-use crate::parallel;
 use crate::program::Program;
 use crate::random::stream::Stream;
+use crate::threads;
 
 /// Number of candidates of a pilot run.
 pub(super) const PILOT: u64 = 1 << 16;
@@ -24,7 +24,7 @@ pub(super) const TOLERABLE_FAILURE: f64 = 1e-12;
 pub(super) fn pilot(program: &Program) -> f64 {
     let kernel = Kernel::<f32>::new(program);
     let stream = Stream::named(0, "pilot");
-    let accepted = parallel::map(PILOT, GRAIN, |index| kernel.accepts(|b| stream.block(index, 0, b)));
+    let accepted = threads::map(PILOT, GRAIN, |index| kernel.accepts(|b| stream.block(index, 0, b)));
     accepted.into_iter().filter(|&accepted| accepted).count() as f64 / PILOT as f64
 }
 
@@ -35,7 +35,7 @@ pub(super) fn pilot_of_draws(program: &Program, least: f64) -> f64 {
     let kernel = Kernel::<f32>::new(program);
     let stream = Stream::named(0, "pilot");
     let draws = ((PILOT as f64 * least) as u64).max(LEAST_DRAWS);
-    let candidates = parallel::map(draws, 1, |index| match kernel.draw(stream, index).1.attempts() {
+    let candidates = threads::map(draws, 1, |index| match kernel.draw(stream, index).1.attempts() {
         0 => u64::from(program.max_attempts),
         attempts => u64::from(attempts),
     });

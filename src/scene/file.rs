@@ -1,7 +1,6 @@
 //! Scene files.
 
 use std::collections::HashMap;
-use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
@@ -11,6 +10,7 @@ use crate::colorimetry;
 use crate::dataset::{Dataset, DatasetError, Table};
 use crate::grid::{Extrapolation, Grid};
 use crate::model::Model;
+use crate::plain_file;
 use crate::program::Bounds;
 use crate::quantity::Quantity;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
@@ -61,12 +61,15 @@ const TARGET: [&str; 12] = [
     "quantities",
 ];
 
+/// The largest scene file that is read, in bytes.
+pub const MAX_FILE_BYTES: u64 = 16 << 20;
+
 impl Scene {
     /// Reads a scene file. Models and spectra that it names are sought in its folder.
     pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
         let path = path.as_ref();
         let name = path.display().to_string();
-        let text = fs::read_to_string(path).map_err(|e| {
+        let text = plain_file::read_text(path, MAX_FILE_BYTES).map_err(|e| {
             let place = SceneErrorPlace { file: Some(name.clone()), ..SceneErrorPlace::default() };
             SceneError::new(place, SceneErrorKind::Read(e))
         })?;

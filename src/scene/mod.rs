@@ -53,7 +53,7 @@ use crate::random::stream::Stream;
 
 use error::{Fault, MAX_COUNT, MAX_DRAWS};
 pub use error::{SceneError, SceneErrorKind, SceneErrorPlace};
-pub use file::PRESETS;
+pub use file::{MAX_FILE_BYTES, PRESETS};
 pub use group::{
     Copies, Group, Hue, Illuminants, IntensityScope, LrvLevels, Surfaces, TargetConstraint, Targets,
 };

@@ -3,12 +3,13 @@
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use rayon::ThreadPool;
 use wgpu::{BufferUsages, Device};
 
 use crate::engine::{DrawSummary, EngineError};
 use crate::quantity::Quantity;
-use crate::sampler::{Prepared, Sampler, SamplerError};
+use crate::sampler::{Prepared, Sampler, SamplerError, filled};
+use crate::threads;
 use crate::wgsl::WORKGROUP;
 
 use super::Scene;
@@ -29,6 +30,8 @@ pub struct SceneSampler<'a> {
     /// Pipeline that multiplies and copies spectra, where some need it.
     copies: Option<wgpu::ComputePipeline>,
     once: Vec<Option<SharedSpectra>>,
+    /// Threads for what the device does not draw.
+    pool: ThreadPool,
 }
 
 /// Scenes, ready to be recorded, any number of times.
@@ -84,7 +87,8 @@ impl<'a> SceneSampler<'a> {
             }));
         }
         let copies = scene.plans.iter().any(copies).then(|| pipeline(device));
-        Ok(SceneSampler { scene, samplers, copies, once: scene.once()? })
+        let pool = threads::pool(None)?;
+        Ok(SceneSampler { scene, samplers, copies, once: pool.install(|| scene.once())?, pool })
     }
 
     /// Buffers for some scenes, and all that records them.
@@ -98,7 +102,7 @@ impl<'a> SceneSampler<'a> {
                 (Some(drawing), Some(sampler)) => {
                     self.drawn(device, plan, (drawing, sampler), scenes.clone())?
                 }
-                _ => made(device, (plan, self.scene.grid.len()), once.as_ref(), scenes.clone())?,
+                _ => self.made(device, plan, once.as_ref(), scenes.clone())?,
             };
             group.values.extend(plan.fixed_intensities());
             Ok(group)
@@ -136,9 +140,9 @@ impl<'a> SceneSampler<'a> {
             copies: plan.count / drawing.places,
             lights: lights.unwrap_or(elements.max(1) as u32),
         };
-        let uniform = filled(device, "spectroll sizes", BufferUsages::UNIFORM, bytemuck::bytes_of(&sizes));
+        let uniform = filled(device, "spectroll sizes", BufferUsages::UNIFORM, bytemuck::bytes_of(&sizes))?;
         let factors = bytemuck::cast_slice(&intensities);
-        let factors = filled(device, "spectroll intensities", BufferUsages::STORAGE, factors);
+        let factors = filled(device, "spectroll intensities", BufferUsages::STORAGE, factors)?;
         let shapes = drawn.buffer(Quantity::Spectra).expect("the program has them");
         let buffers = [&uniform, shapes, &factors, &spectra];
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -160,6 +164,29 @@ impl<'a> SceneSampler<'a> {
             spectra: Some(spectra),
             values: values.map(|array| (array, intensities)).into_iter().collect(),
         })
+    }
+
+    /// A group that the CPU makes.
+    fn made(
+        &self,
+        device: &Device,
+        plan: &'a GroupPlan,
+        once: Option<&SharedSpectra>,
+        scenes: Range<u64>,
+    ) -> Result<Group<'a>, EngineError> {
+        let mut summary = DrawSummary::default();
+        let columns =
+            self.pool.install(|| columns(plan, once, None, (scenes.start, scenes), &mut summary))?;
+        let spectra = match once {
+            Some(once) if plan.intensity.is_none() => once.of(Quantity::Spectra),
+            _ => columns.of(Quantity::Spectra),
+        };
+        let bands = self.scene.grid.len();
+        check(device, (spectra.len() / bands) as u64, bands)?;
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        let buffer = filled(device, "spectroll spectra", usage, bytemuck::cast_slice(spectra))?;
+        let values = columns.known(plan);
+        Ok(Group { plan, drawn: None, copied: None, spectra: Some(buffer), values })
     }
 }
 
@@ -195,26 +222,6 @@ impl PreparedScene<'_> {
         let mut values = self.groups.iter().flat_map(|group| &group.values);
         values.find(|(array, _)| array.name == name).map(|(_, values)| values.as_slice())
     }
-}
-
-/// A group that the CPU makes.
-fn made<'a>(
-    device: &Device,
-    (plan, bands): (&'a GroupPlan, usize),
-    once: Option<&SharedSpectra>,
-    scenes: Range<u64>,
-) -> Result<Group<'a>, EngineError> {
-    let columns = columns(plan, once, None, (scenes.start, scenes), &mut DrawSummary::default())?;
-    let spectra = match once {
-        Some(once) if plan.intensity.is_none() => once.of(Quantity::Spectra),
-        _ => columns.of(Quantity::Spectra),
-    };
-    check(device, (spectra.len() / bands) as u64, bands)?;
-    let label = format!("spectroll {}", plan.name);
-    let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-    let buffer = filled(device, &label, usage, bytemuck::cast_slice(spectra));
-    let values = columns.known(plan);
-    Ok(Group { plan, drawn: None, copied: None, spectra: Some(buffer), values })
 }
 
 /// Whether spectra are drawn that are not yet those of the group.
@@ -265,12 +272,6 @@ fn pipeline(device: &Device) -> wgpu::ComputePipeline {
         compilation_options: wgpu::PipelineCompilationOptions::default(),
         cache: None,
     })
-}
-
-/// A buffer of these bytes; of four zeros where there are none, since a binding is not empty.
-fn filled(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
-    let contents = if bytes.is_empty() { &[0; 4] } else { bytes };
-    device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage })
 }
 
 #[cfg(test)]

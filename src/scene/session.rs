@@ -2,13 +2,15 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
+use rayon::ThreadPool;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::cpu::Kernel;
 use crate::draw_status::DrawStatus;
 use crate::engine::{Batch, DrawSummary, Engine, EngineError, Job, Schedule};
-use crate::parallel;
 use crate::quantity::Quantity;
 use crate::random::stream::{DrawRange, Draws};
 
@@ -18,9 +20,6 @@ use super::plan::{Array, Drawing, GroupPlan, Shapes, is_multiplied};
 
 /// Approximate size of a window in bytes, where no engine draws it.
 const WINDOW_BYTES: u64 = 8 << 20;
-
-/// Number of draws that are worth a thread.
-const GRAIN: u64 = 16;
 
 /// Some scenes, with every array that differs between scenes.
 #[derive(Debug)]
@@ -37,6 +36,8 @@ pub struct SceneSession<'a> {
     schedule: Option<Schedule<'a>>,
     /// Spectra of each group that were drawn once.
     once: Vec<Option<SharedSpectra>>,
+    /// Threads for what the engine does not draw.
+    pool: Arc<ThreadPool>,
 }
 
 /// Summary of a group's draws.
@@ -94,10 +95,11 @@ impl Scene {
             .map(|drawing| Job { recipe: &drawing.recipe, per_step: drawing.places.into() })
             .collect();
         let schedule = (!members.is_empty()).then(|| engine.schedule(&members)).transpose()?;
-        Ok(SceneSession { scene: self, schedule, once: self.once()? })
+        let pool = engine.pool()?;
+        Ok(SceneSession { scene: self, schedule, once: pool.install(|| self.once())?, pool })
     }
 
-    /// Draws the spectra that serve all scenes, for each group.
+    /// Draws the spectra that serve all scenes, for each group, in the rayon pool that it is called in.
     pub(super) fn once(&self) -> Result<Vec<Option<SharedSpectra>>, EngineError> {
         let once = |plan: &GroupPlan| match &plan.shapes {
             Shapes::Once(drawing) => SharedSpectra::new(plan, drawing).map(Some),
@@ -111,8 +113,8 @@ impl SharedSpectra {
     fn new(plan: &GroupPlan, drawing: &Drawing) -> Result<SharedSpectra, EngineError> {
         let kernel = Kernel::<f32>::new(drawing.recipe.program());
         let stream = plan.stream.in_rows(drawing.places);
-        let drawn = parallel::map(drawing.places.into(), GRAIN, |place| kernel.draw(stream, place));
-        let (drawn, statuses): (Vec<_>, Vec<_>) = drawn.into_iter().unzip();
+        let drawn = (0..u64::from(drawing.places)).into_par_iter().map(|place| kernel.draw(stream, place));
+        let (drawn, statuses): (Vec<_>, Vec<_>) = drawn.unzip();
         check(plan, drawing.places, 0, &statuses)?;
         // One for each element, or one for all.
         let copies = (plan.count / drawing.places) as usize;
@@ -177,7 +179,7 @@ impl SceneSession<'_> {
         scenes: Range<u64>,
         mut sink: impl FnMut(Window) -> Result<(), E>,
     ) -> Result<Vec<GroupSummary>, E> {
-        let (scene, once) = (self.scene, &self.once);
+        let (scene, once, pool) = (self.scene, &self.once, &self.pool);
         let none = |plan: &GroupPlan| GroupSummary { group: plan.name.clone(), ..GroupSummary::default() };
         let mut summaries: Vec<_> = scene.plans.iter().map(none).collect();
         let (first, mut next) = (scenes.start, scenes.start);
@@ -189,8 +191,8 @@ impl SceneSession<'_> {
             for ((plan, once), summary) in scene.plans.iter().zip(once).zip(&mut summaries) {
                 let drawing = plan.drawn_by_engine();
                 let batch = drawing.and_then(|drawing| batches.next().map(|batch| (drawing, batch)));
-                let columns =
-                    columns(plan, once.as_ref(), batch, (first, part.clone()), &mut summary.summary)?;
+                let (once, scenes) = (once.as_ref(), (first, part.clone()));
+                let columns = pool.install(|| columns(plan, once, batch, scenes, &mut summary.summary))?;
                 arrays.extend(columns.arrays(plan));
             }
             sink(Window { scenes: part, arrays })
@@ -227,7 +229,7 @@ impl SceneSession<'_> {
 }
 
 /// The columns of a group in some scenes, of a run whose first scene is `first`. What scenes share is counted in the
-/// first of them that the run has.
+/// first of them that the run has. Works in the rayon pool that it is called in.
 pub(super) fn columns<'a>(
     plan: &'a GroupPlan,
     once: Option<&'a SharedSpectra>,
@@ -255,10 +257,10 @@ pub(super) fn columns<'a>(
             Columns { values: values.collect(), ..Columns::default() }
         }
         (Shapes::Target(target), ..) => {
-            let (each, count) = (u64::from(plan.count), scenes.end - scenes.start);
-            let drawn = parallel::map(count * each, GRAIN, |number| {
-                target.draw(plan.stream, scenes.start + number / each, (number % each) as u32)
-            });
+            let elements = (scenes.start..scenes.end).into_par_iter();
+            let elements = elements.flat_map_iter(|scene| (0..plan.count).map(move |e| (scene, e)));
+            let drawn: Vec<_> =
+                elements.map(|(scene, element)| target.draw(plan.stream, scene, element)).collect();
             let statuses: Vec<DrawStatus> = drawn.iter().filter_map(|drawn| drawn.status).collect();
             check(plan, plan.count, scenes.start, &statuses)?;
             if !statuses.is_empty() {
@@ -274,7 +276,7 @@ pub(super) fn columns<'a>(
                         drawn.iter().filter_map(|d| d.xyz).flatten().collect()
                     }
                     (seen, Some(observer)) => {
-                        drawn.iter().flat_map(|d| observer.see(&d.spectrum, seen)).collect()
+                        drawn.par_iter().flat_map_iter(|d| observer.see(&d.spectrum, seen)).collect()
                     }
                     (other, None) => unreachable!("targets have no {other}"),
                 }

@@ -6,6 +6,7 @@ use spectroll::evaluation::comparison::{Comparison, ComparisonFigures, Moments};
 use spectroll::{Dataset, Extrapolation, Model, Recipe, SpectrumKind, Stream, Table};
 
 use crate::cli::exit::Usage;
+use crate::cli::options::DataArguments;
 use crate::cli::parse::grouped;
 
 /// Number of draws that are compared with the data.
@@ -17,9 +18,8 @@ pub(super) struct Arguments {
     /// Compare the draws with these measured spectra: files as `fit` reads them, or munsell, vrhel, granada
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<String>,
-    /// Multiply the data by this, as `fit --scale`
-    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", value_parser = crate::cli::fit::factor, requires = "data")]
-    scale: f64,
+    #[command(flatten)]
+    reading: DataArguments,
 }
 
 impl Arguments {
@@ -31,12 +31,21 @@ impl Arguments {
     /// Compares the data with draws of `seed`; `None` where there are no data.
     pub(super) fn compare(&self, recipe: &Recipe, seed: u64) -> anyhow::Result<Option<Compared>> {
         if !self.is_asked() {
+            if self.reading.is_asked() {
+                return Err(Usage(
+                    "the options of reading files need some: name them with --data".to_owned(),
+                )
+                .into());
+            }
             return Ok(None);
         }
         let model = recipe.model();
-        let table =
-            |name: &String| anyhow::Ok(crate::cli::fit::table(name, Some(model.grid()))?.scaled(self.scale));
-        let tables = self.data.iter().map(table).collect::<anyhow::Result<Vec<Table>>>()?;
+        let mut tables: Vec<Table> = Vec::new();
+        for name in &self.data {
+            let (table, notes) = self.reading.table(name, Some(model.grid()), model.grid())?;
+            notes.iter().for_each(|note| tell!("{}: {note}", table.name()));
+            tables.push(table);
+        }
         if let Some(other) = tables.iter().find(|table| table.kind().is_some_and(|kind| kind != model.kind()))
         {
             return Err(Usage(format!(
@@ -54,6 +63,7 @@ impl Arguments {
             ))
             .into());
         }
+        data.judge(model.kind())?;
         let comparison = Comparison::new(recipe, &data, Stream::new(seed), DRAWS)?;
         Ok(Some(Compared {
             figures: comparison.figures(),

@@ -196,7 +196,8 @@ fn table(
     text
 }
 
-fn line(text: &mut String, label: &str, value: &str) {
+/// Adds a line of a label and a value, and others below it where the value is long.
+pub(super) fn line(text: &mut String, label: &str, value: &str) {
     const LABEL: usize = 15;
     let mut label = label;
     for part in wrapped(value, 80 - LABEL) {

@@ -8,13 +8,16 @@
 //! ```
 
 use std::ffi::OsString;
-use std::fs;
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
+use spectroll::plain_file::read_text;
 use toml::Value;
 
 use crate::cli::exit::Usage;
+
+/// The largest configuration that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 20;
 
 /// The arguments of the program, with those of the file that they name put in where they are missing.
 pub(in crate::cli) fn expand(command: &Command, given: Vec<OsString>) -> Result<Vec<OsString>, Usage> {
@@ -29,7 +32,7 @@ pub(in crate::cli) fn expand(command: &Command, given: Vec<OsString>) -> Result<
     let subcommand = command.find_subcommand(name).expect("it was found when parsing");
 
     let unusable = |reason: String| Usage(format!("cannot use the configuration {path:?}: {reason}"));
-    let text = fs::read_to_string(path).map_err(|e| unusable(e.to_string()))?;
+    let text = read_text(path, MAX_BYTES).map_err(|e| unusable(e.to_string()))?;
     let table: toml::Table = text.parse().map_err(|e: toml::de::Error| unusable(e.to_string()))?;
     let mut all = given;
     for (key, value) in table {

@@ -1,11 +1,13 @@
 //! Groups of options that several commands share.
 
 pub(super) mod config;
+mod data;
 mod engine;
 mod output;
 mod recipe;
 mod shard;
 
+pub(super) use data::DataArguments;
 pub(super) use engine::EngineArguments;
 pub(super) use output::{OutputArguments, Purpose};
 pub(super) use recipe::RecipeArguments;

@@ -2,6 +2,7 @@
 
 mod colours;
 pub(super) mod comparison;
+pub(super) mod look;
 pub(super) mod model;
 mod panel;
 pub(super) mod scene;

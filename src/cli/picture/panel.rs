@@ -19,15 +19,15 @@ const GAP: f64 = 14.0;
 /// One panel: what is drawn, on what axes, and the text around them.
 pub(super) type Panel = (Vec<Plot>, Layout, Caption);
 
-/// Draws four panels, row by row.
-pub(super) fn arrange(panels: [Panel; 4], theme: Theme) -> Scene {
+/// Draws panels, two in a row.
+pub(super) fn arrange<const N: usize>(panels: [Panel; N], theme: Theme) -> Scene {
     let (mut plots, mut layouts, mut text) = (Vec::new(), Vec::new(), Vec::new());
     for (index, (plot, layout, caption)) in panels.into_iter().enumerate() {
         plots.push(plot);
         layouts.push(layout);
         text.extend(caption.draw(&place(index), theme));
     }
-    let mut drawing = Figure::new(2, 2)
+    let mut drawing = Figure::new(N.div_ceil(2), 2)
         .with_plots(plots)
         .with_layouts(layouts)
         .with_cell_size(PANEL.0, PANEL.1)

@@ -3,6 +3,7 @@
 mod dry_run;
 mod progress;
 mod summary;
+mod waiting;
 
 use spectroll::export::{ExportError, Rows, Writing};
 use spectroll::output::SetStatus;
@@ -11,6 +12,7 @@ use super::interrupt::{self, Interrupted};
 pub(super) use dry_run::{DryRun, folder_of};
 use progress::{Progress, Shown};
 pub(super) use summary::{above_one, impossible_mean, kind, part, room, status};
+pub(super) use waiting::Waiting;
 
 /// Draws the rows that are missing, shows how far that is, and completes the output.
 pub(super) fn make(

@@ -49,6 +49,7 @@ use crate::engine::{Engine, EngineChoice, EngineError};
 use crate::evaluation::stress::{self, Outcome};
 use crate::model::Model;
 use crate::recipe::{Recipe, RecipeError};
+use crate::threads;
 use engines::Subject;
 use progress::Agenda;
 
@@ -184,6 +185,11 @@ struct Bench<'a> {
 
 /// Makes all measurements. Where `watch` asks for an end, the report has the sections that were finished by then.
 pub fn measure(options: &Options, watch: Watch) -> Result<Report, ReportError> {
+    let pool = threads::pool(None).map_err(EngineError::from)?;
+    pool.install(|| measure_all(options, watch))
+}
+
+fn measure_all(options: &Options, watch: Watch) -> Result<Report, ReportError> {
     let (start, date) = (Instant::now(), Utc::now().format("%Y-%m-%d %H:%M UTC").to_string());
     let mut targets = Vec::new();
     for choice in &options.engines {

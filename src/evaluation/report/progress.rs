@@ -104,7 +104,7 @@ pub struct Progress {
 
 /// Callback that hears from time to time what is being done; `false` from it ends the work. What was measured by then
 /// is kept.
-pub type Watch<'a> = &'a dyn Fn(&Progress) -> bool;
+pub type Watch<'a> = &'a (dyn Fn(&Progress) -> bool + Sync);
 
 /// Sections in order, with the time that they take.
 pub(super) struct Agenda<'a> {
@@ -215,6 +215,8 @@ fn forecast(work: f64, all: f64, elapsed: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+
     use super::*;
 
     #[test]
@@ -230,9 +232,9 @@ mod tests {
 
     #[test]
     fn sections_are_weighed_by_their_time() {
-        let heard = RefCell::new(Vec::new());
+        let heard = Mutex::new(Vec::new());
         let watch = |progress: &Progress| {
-            heard.borrow_mut().push((progress.section.clone(), progress.done));
+            heard.lock().unwrap().push((progress.section.clone(), progress.done));
             progress.step != "stop"
         };
         let agenda = Agenda::new(&["a".to_owned()], Effort::Quick, false, &watch);
@@ -244,7 +246,7 @@ mod tests {
         });
         assert_eq!(half.unwrap(), None);
         let all = 27.0;
-        let (name, done) = heard.borrow().last().cloned().unwrap();
+        let (name, done) = heard.lock().unwrap().last().cloned().unwrap();
         assert_eq!(name, "a: 2. Numerical error against cost");
         assert!((done - (8.0 + 1.5) / all).abs() < 1e-9, "{done}");
         let sections = agenda.into_sections();

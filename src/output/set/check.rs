@@ -40,10 +40,10 @@ pub(super) fn check(manifest: &Manifest) -> Result<(), String> {
 fn check_plan(plan: &SetPlan) -> Result<(), String> {
     let schema = &plan.schema;
     check_schema(schema)?;
-    match plan.chunk == 0 || plan.chunk > schema.count.max(1) {
-        true => Err(format!("chunks of {} draws are none of a set of {}", plan.chunk, schema.count)),
-        false => Ok(()),
+    if plan.chunk == 0 || plan.chunk > schema.count.max(1) {
+        return Err(format!("chunks of {} draws are none of a set of {}", plan.chunk, schema.count));
     }
+    plan.check_chunks(Path::new("the set")).map_err(|e| e.to_string())
 }
 
 /// Describes what in a schema no data set can have, if there is something.

@@ -11,6 +11,12 @@ use super::{SetPlan, parts, zarr};
 /// Approximate default size of a chunk in bytes: large enough for a disk, small enough to hold several.
 const CHUNK_BYTES: u64 = 16 << 20;
 
+/// The most bytes of a chunk of more than one draw: four are in memory at once.
+pub(super) const MOST_CHUNK_BYTES: u64 = 1 << 30;
+
+/// The most chunks of a set: its manifest has an entry for each, and its folder a file.
+pub(super) const MOST_CHUNKS: u64 = 1_000_000;
+
 /// Format of a set's chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -40,9 +46,12 @@ impl Part<'_> {
 }
 
 impl ChunkFormat {
-    /// Default number of draws per chunk, for rows of `row_bytes` and `count` draws in all: a power of two, or all.
+    /// Default number of draws per chunk, for rows of `row_bytes` and `count` draws in all: a power of two of about 16
+    /// MiB, or what makes no more than a million chunks, or all.
     pub fn default_chunk(row_bytes: u64, count: u64) -> u64 {
-        (1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2()).min(count.max(1))
+        let usual = 1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2();
+        let least = count.div_ceil(MOST_CHUNKS).checked_next_power_of_two().unwrap_or(count);
+        least.max(usual).min(count.max(1))
     }
 
     /// Encodes the files of a chunk.
@@ -119,5 +128,8 @@ mod tests {
         assert_eq!(ChunkFormat::default_chunk(1 << 40, 10), 1);
         assert_eq!(ChunkFormat::default_chunk(124, 10), 10);
         assert_eq!(ChunkFormat::default_chunk(124, 0), 1);
+        // 2 x 10^12 draws of 124 bytes, of which 16 MiB would be 15 million chunks.
+        assert_eq!(ChunkFormat::default_chunk(124, 2_000_000_000_000), 1 << 21);
+        assert_eq!(ChunkFormat::default_chunk(124, u64::MAX), 1 << 45);
     }
 }

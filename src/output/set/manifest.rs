@@ -13,10 +13,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::super::pending::ignore_missing;
-use super::super::sum::{Sum, is_signed, regular, signed};
-use super::super::{OutputError, Schema, partial};
+use super::super::sum::{LARGEST, Sum, is_signed, signed};
+use super::super::{ByteCount, OutputError, Schema, partial};
 use super::check::check;
+use super::layout::{MOST_CHUNK_BYTES, MOST_CHUNKS};
 use super::{ChunkFormat, SetMode, Shard};
+use crate::plain_file::read_text;
 
 /// Name of the manifest of a whole set.
 pub(super) const SEALED: &str = "_manifest.json";
@@ -40,6 +42,26 @@ impl SetPlan {
     /// Number of chunks.
     pub fn chunks(&self) -> u64 {
         self.schema.count.div_ceil(self.chunk)
+    }
+
+    /// Refuses what a set at `path` cannot be: too many chunks, or too large ones, or arrays that its format cannot hold.
+    pub fn check(&self, path: &Path) -> Result<(), OutputError> {
+        self.layout.check(path, &self.schema)?;
+        self.check_chunks(path)
+    }
+
+    /// Refuses too many chunks, or too large ones.
+    pub(super) fn check_chunks(&self, path: &Path) -> Result<(), OutputError> {
+        let (path, row) = (path.to_owned(), self.schema.row_bytes().max(1));
+        if self.chunk > 1 && self.chunk.saturating_mul(row) > MOST_CHUNK_BYTES {
+            let most = (MOST_CHUNK_BYTES / row).max(1);
+            let bytes = ByteCount(self.chunk.saturating_mul(row));
+            return Err(OutputError::LargeChunks { path, rows: self.chunk, bytes, most });
+        }
+        match self.chunks() > MOST_CHUNKS {
+            true => Err(OutputError::ManyChunks { path, chunks: self.chunks() }),
+            false => Ok(()),
+        }
     }
 
     /// Range of draws in a chunk, counted from the set's first.
@@ -218,7 +240,7 @@ struct Head {
 /// Reads a manifest, if it exists.
 fn read(path: &Path) -> Result<Option<Manifest>, OutputError> {
     let failed = |reason: String| OutputError::Manifest { path: path.to_owned(), reason };
-    let text = match regular(path) {
+    let text = match read_text(path, LARGEST) {
         Ok(text) => text,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(failed(e.to_string())),

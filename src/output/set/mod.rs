@@ -22,9 +22,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use super::OutputError;
 use super::lock::LockFile;
 use super::pending::{existing_folder, place};
+use super::sum::Sum;
+use crate::threads;
 pub use audit::{Fault, Piece, SetAudit};
 pub use layout::ChunkFormat;
 use layout::Part;
@@ -34,8 +38,6 @@ use occupy::{Begun, generation, occupy};
 use pool::{Chunk, Pool};
 use seal::Depth;
 pub use seal::{SetStatus, merge};
-
-use crate::parallel;
 
 /// Shortest time between saves of the manifest: a killed run repeats no more than this. Saves take at most a
 /// twentieth of the time.
@@ -121,6 +123,7 @@ impl SetWriter {
         if path.is_symlink() {
             path = fs::canonicalize(&path).unwrap_or(path); // the target is replaced, and not the link
         }
+        plan.check(&path)?;
         existing_folder(&path)?;
         let begun = occupy(&path, &plan, shard, start)?;
         let (root, held) = match begun {
@@ -135,20 +138,18 @@ impl SetWriter {
             manifest.engines = found.engines;
             let found: Vec<_> = found.chunks.into_iter().filter(|(index, _)| own.contains(index)).collect();
             // Those of a complete set were checked as it was opened.
-            let is_sound = |number: u64| {
-                let (_, sums) = &found[number as usize];
+            let is_sound = |(_, sums): &(u64, Vec<Sum>)| {
                 held.is_none() || sums.iter().all(|sum| sum.fault(&root).is_none())
             };
-            let sound = parallel::map(found.len() as u64, 1, is_sound);
-            let kept = found.into_iter().zip(sound).filter(|(_, is_sound)| *is_sound);
-            manifest.chunks = kept.map(|(chunk, _)| chunk).collect();
+            manifest.chunks =
+                threads::pool(None)?.install(|| found.into_par_iter().filter(is_sound).collect());
         }
         let missing: std::collections::VecDeque<u64> =
             own.filter(|index| !manifest.chunks.contains_key(index)).collect();
         let plan = Arc::new(plan);
         let mut writer = SetWriter {
             filling: vec![Vec::new(); plan.schema.fields.len()],
-            pool: Pool::new(&plan, &root),
+            pool: Pool::new(&plan, &root)?,
             plan,
             shard,
             start,

@@ -10,6 +10,7 @@ use std::thread::JoinHandle;
 use super::super::pending::place;
 use super::super::sum::Sum;
 use super::SetPlan;
+use crate::threads::{self, ThreadError};
 
 /// Number of threads: one can hash while the other waits for the disk.
 const THREADS: usize = 2;
@@ -36,7 +37,7 @@ pub(super) struct Pool {
 
 impl Pool {
     /// Starts threads that write the chunks of a set in the folder `root`.
-    pub(super) fn new(plan: &Arc<SetPlan>, root: &Path) -> Pool {
+    pub(super) fn new(plan: &Arc<SetPlan>, root: &Path) -> Result<Pool, ThreadError> {
         // One waits: with one being filled and one a thread, that bounds the memory to four.
         let (queue, chunks) = sync_channel(1);
         let (finished, done) = channel();
@@ -50,9 +51,10 @@ impl Pool {
                 finished: finished.clone(),
                 stopped: stopped.clone(),
             };
-            std::thread::spawn(move || worker.run())
+            threads::spawn(move || worker.run())
         });
-        Pool { queue: Some(queue), done, threads: threads.collect(), stopped }
+        // Should the second not start, the first ends as its queue is gone.
+        Ok(Pool { queue: Some(queue), done, threads: threads.collect::<Result<_, _>>()?, stopped })
     }
 
     /// Hands over a chunk; waits where others are waiting already.

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use rayon::prelude::*;
+
 use super::super::lock::{Attempt, LockFile};
 use super::super::pending::{folder, ignore_missing, place, sweep, sync_folder};
 use super::super::sum::Sum;
@@ -13,7 +15,7 @@ use super::manifest::{Manifest, SEALED, remove_parts};
 use super::occupy::{
     LOCK, PATIENCE, PAUSE, busy, folders, generation, is_being_made, is_lock_name, remove_replaced, replaced,
 };
-use crate::parallel;
+use crate::threads;
 
 /// Largest number of faults that a message names.
 const NAMED: usize = 20;
@@ -139,11 +141,12 @@ fn whole(path: &Path, root: &Path) -> Result<Manifest, OutputError> {
 /// Refuses a set whose files are not those that were written.
 fn check(root: &Path, manifest: &Manifest, depth: Depth) -> Result<(), OutputError> {
     let sums: Vec<&Sum> = manifest.sums().collect();
-    let faults = parallel::map(sums.len() as u64, 1, |number| match depth {
-        Depth::Sizes => sums[number as usize].size_fault(root),
-        Depth::Sums => sums[number as usize].fault(root),
-    });
-    let mut faults: Vec<String> = faults.into_iter().flatten().collect();
+    let fault = |sum: &Sum| match depth {
+        Depth::Sizes => sum.size_fault(root),
+        Depth::Sums => sum.fault(root),
+    };
+    let mut faults: Vec<String> =
+        threads::pool(None)?.install(|| sums.into_par_iter().filter_map(fault).collect());
     if faults.is_empty() {
         return Ok(());
     }

@@ -1,10 +1,50 @@
-//! Work on all cores by threads that end with it. No pool outlives a call: the child of a process that forks inherits
-//! pools without their threads, and would wait for these for ever.
+//! Threads of the library's own. Rayon's global pool is never used: it panics where it cannot start its threads, and a
+//! forked child waits in it for threads that it has not got.
 
+use std::io;
 use std::num::NonZeroUsize;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread;
+use std::thread::{self, Builder, JoinHandle, Scope, ScopedJoinHandle};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Error returned where the system starts no more threads, as where their number is limited (`ulimit -u`, containers).
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cannot start a thread: {0}; ask for fewer, or raise the limit on them")]
+pub struct ThreadError(String);
+
+/// Starts a pool of this number of threads; where it is `None`, of one per core, or as many of them as start.
+pub(crate) fn pool(threads: Option<NonZeroUsize>) -> Result<ThreadPool, ThreadError> {
+    let start = |count| ThreadPoolBuilder::new().num_threads(count).build();
+    let mut count = threads.map_or_else(cores, NonZeroUsize::get);
+    let mut pool = start(count);
+    while pool.is_err() && threads.is_none() && count > 1 {
+        count /= 2;
+        pool = start(count);
+    }
+    pool.map_err(|e| ThreadError(e.to_string()))
+}
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
+}
+
+/// Starts a thread.
+pub(crate) fn spawn(work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, ThreadError> {
+    Builder::new().spawn(work).map_err(error)
+}
+
+/// Starts a thread that ends within `scope`.
+pub(crate) fn spawn_scoped<'scope, T: Send + 'scope>(
+    scope: &'scope Scope<'scope, '_>,
+    work: impl FnOnce() -> T + Send + 'scope,
+) -> Result<ScopedJoinHandle<'scope, T>, ThreadError> {
+    Builder::new().spawn_scoped(scope, work).map_err(error)
+}
+
+fn error(source: io::Error) -> ThreadError {
+    ThreadError(source.to_string())
+}
 
 /// Number of parts per thread, so that none waits long for another.
 const PARTS: u64 = 8;
@@ -30,7 +70,7 @@ pub(crate) fn map<R: Send>(count: u64, grain: u64, each: impl Fn(u64) -> R + Syn
     };
     let mut parts = thread::scope(|scope| {
         // A thread that cannot be started leaves its work to the others.
-        let start = |_| thread::Builder::new().spawn_scoped(scope, work).ok();
+        let start = |_| Builder::new().spawn_scoped(scope, work).ok();
         let others: Vec<_> = (1..threads).filter_map(start).collect();
         let mut parts = work();
         for other in others {
@@ -43,12 +83,6 @@ pub(crate) fn map<R: Send>(count: u64, grain: u64, each: impl Fn(u64) -> R + Syn
     });
     parts.sort_unstable_by_key(|(first, _)| *first);
     parts.into_iter().flat_map(|(_, results)| results).collect()
-}
-
-/// Number of threads that this process can run at once, which takes reading files to find out.
-fn cores() -> usize {
-    static CORES: OnceLock<usize> = OnceLock::new();
-    *CORES.get_or_init(|| thread::available_parallelism().map_or(1, NonZeroUsize::get))
 }
 
 #[cfg(test)]

@@ -1,0 +1,105 @@
+//! Numbers as files hold them: floats and integers of every width, in both orders of their bytes.
+
+use half::f16;
+
+/// Type of the numbers of an array.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Number {
+    pub(super) kind: NumberKind,
+    /// Width in bytes.
+    pub(super) bytes: usize,
+    pub(super) big_endian: bool,
+}
+
+/// Kind of a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum NumberKind {
+    /// IEEE 754: of 2, 4 or 8 bytes.
+    Float,
+    /// Two's complement: of 1, 2, 4 or 8 bytes.
+    Signed,
+    /// Of 1, 2, 4 or 8 bytes.
+    Unsigned,
+}
+
+impl Number {
+    /// The number of NumPy's name for it: `<f4`, `>i2`, `|u1`. None of any other type.
+    pub(super) fn named(name: &str) -> Option<Number> {
+        let (order, kind) = (name.get(..1)?, name.get(1..2)?);
+        let bytes = name.get(2..)?.parse().ok()?;
+        let kind = match (kind, bytes) {
+            ("f", 2 | 4 | 8) => NumberKind::Float,
+            ("i", 1 | 2 | 4 | 8) => NumberKind::Signed,
+            ("u", 1 | 2 | 4 | 8) => NumberKind::Unsigned,
+            _ => return None,
+        };
+        match order {
+            "<" | ">" => {}
+            "|" | "=" if bytes == 1 => {}
+            _ => return None,
+        }
+        Some(Number { kind, bytes, big_endian: order == ">" })
+    }
+
+    /// The number of a name such as `float32` or `uint8`, in this order.
+    pub(super) fn spelled(name: &str, big_endian: bool) -> Option<Number> {
+        let start = name.find(|c: char| c.is_ascii_digit())?;
+        let bits: usize = name[start..].parse().ok()?;
+        let kind = match (&name[..start], bits) {
+            ("float", 16 | 32 | 64) => NumberKind::Float,
+            ("int", 8 | 16 | 32 | 64) => NumberKind::Signed,
+            ("uint", 8 | 16 | 32 | 64) => NumberKind::Unsigned,
+            _ => return None,
+        };
+        Some(Number { kind, bytes: bits / 8, big_endian })
+    }
+
+    /// Reads as many bytes as a number has.
+    pub(super) fn read(self, bytes: &[u8]) -> f64 {
+        let mut word = [0; 8];
+        for (i, &byte) in bytes.iter().enumerate() {
+            word[if self.big_endian { self.bytes - 1 - i } else { i }] = byte;
+        }
+        let bits = u64::from_le_bytes(word);
+        match (self.kind, self.bytes) {
+            (NumberKind::Float, 2) => f16::from_bits(bits as u16).to_f64(),
+            (NumberKind::Float, 4) => f64::from(f32::from_bits(bits as u32)),
+            (NumberKind::Float, _) => f64::from_bits(bits),
+            (NumberKind::Unsigned, _) => bits as f64,
+            (NumberKind::Signed, bytes) => {
+                let unused = 64 - 8 * bytes as u32;
+                ((bits << unused) as i64 >> unused) as f64
+            }
+        }
+    }
+
+    /// Reads all numbers of these bytes; an incomplete one at the end is left.
+    pub(super) fn read_all(self, bytes: &[u8]) -> Vec<f64> {
+        match (self.kind, self.bytes, self.big_endian) {
+            (NumberKind::Float, 8, false) => {
+                bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect()
+            }
+            (NumberKind::Float, 4, false) => {
+                bytes.as_chunks().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect()
+            }
+            (NumberKind::Unsigned, 2, false) => {
+                bytes.as_chunks().0.iter().map(|b| f64::from(u16::from_le_bytes(*b))).collect()
+            }
+            _ => bytes.chunks_exact(self.bytes).map(|b| self.read(b)).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signs_and_orders() {
+        assert_eq!(Number::named("<i2").unwrap().read(&(-5i16).to_le_bytes()), -5.0);
+        assert_eq!(Number::named(">i8").unwrap().read(&(-5i64).to_be_bytes()), -5.0);
+        assert_eq!(Number::spelled("uint16", true).unwrap().read_all(&[1, 0, 0, 2, 9]), [256.0, 2.0]);
+        assert_eq!(Number::spelled("float32", false).unwrap().read_all(&0.5f32.to_le_bytes()), [0.5]);
+        assert_eq!((Number::named("<c8"), Number::spelled("complex64", false)), (None, None));
+    }
+}
