@@ -20,8 +20,14 @@ use crate::process::PerProcess;
 /// Number of draws between two looks at whether somebody pressed Ctrl-C: some 20 ms.
 const BLOCK: u64 = 1 << 19;
 
-/// Open engines, by their choice and number of threads. They stay open, as a device takes long to open.
-static ENGINES: PerProcess<Mutex<HashMap<(String, usize), Arc<Engine>>>> = PerProcess::new();
+/// Engines by their choice and number of threads.
+type Engines = HashMap<(String, usize), Arc<Engine>>;
+
+/// Name, type, width, axis and channels of an array.
+type Format = (&'static str, &'static str, usize, Option<&'static str>, Vec<&'static str>);
+
+/// Open engines. They stay open, as a device takes long to open.
+static ENGINES: PerProcess<Mutex<Engines>> = PerProcess::new();
 
 /// Engine that is asked for.
 #[derive(Clone)]
@@ -137,8 +143,8 @@ impl Sampler {
         Ok(py.detach(|| self.request.engine())?.to_string())
     }
 
-    /// Name, type, width, axis and channels of each array, in the order in which they are drawn.
-    fn formats(&self) -> Vec<(&'static str, &'static str, usize, Option<&'static str>, Vec<&'static str>)> {
+    /// Formats of the arrays, in the order in which they are drawn.
+    fn formats(&self) -> Vec<Format> {
         let formats = self.recipe.formats().into_iter();
         formats
             .map(|ArrayFormat { quantity, dtype, width, .. }| {
