@@ -1,5 +1,5 @@
 # Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
-.PHONY: demo test exhaustive faults fuzz mutants bench driver python
+.PHONY: demo test test-python wheel notebook exhaustive faults fuzz mutants bench driver python
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
@@ -16,11 +16,29 @@ demo:
 
 test: driver python
 	cargo test --locked --release
+	@sh scripts/wheel.sh $(VENV) target/wheel -m 'not slow'
+
+# The Python package alone: its wheel, installed into a fresh environment.
+test-python: driver python
+	@sh scripts/wheel.sh $(VENV) target/wheel -m 'not slow'
+
+# A wheel for any Linux with glibc 2.17 or newer, with Zig as its linker; elsewhere, one for this system.
+wheel: python
+	$(SPECTROLL_PYTHON) -m pip install --quiet 'maturin[zig]>=1.16,<2'
+	$(VENV)/bin/maturin build --release --locked --interpreter $(SPECTROLL_PYTHON) --out target/wheels \
+		$(if $(filter Linux,$(shell uname -s)),--zig --compatibility manylinux2014)
+
+# Runs the notebook with the wheel that was tested last, and keeps its pictures.
+notebook:
+	target/wheel/venv/bin/python scripts/notebook.py
 
 # What takes minutes: all 2^32 words through the radius and the circle, the statistics under 200 seeds, and the fit on
-# 100,000 matrices and 1,000 small files.
+# 100,000 matrices and 1,000 small files, and draws on clusters of Dask and Ray.
 exhaustive: python
 	cargo test --locked --release --lib --test statistics --test fit -- --ignored --nocapture
+	test -d target/wheel/venv || $(MAKE) test-python
+	target/wheel/venv/bin/python -m pip install --quiet -r python/tests/requirements-slow.txt
+	target/wheel/venv/bin/python -m pytest -q -m slow
 
 # Every system call that a run makes fails once, and from there on.
 faults:

@@ -15,15 +15,18 @@ struct Parameters {
 }
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
+// The draws, each by the words of its index, where they are those of a list. // if listed
+@group(0) @binding(INDICES_AT) var<storage, read> indices: array<vec2<u32>>; // if listed
 
 // Draw i of the range.
 fn draw_at(i: u32) -> Draw {
-    let low = parameters.first.x + i;
-    let carry = select(0u, 1u, low < i);
-    var index = vec2(low, parameters.first.y + carry);
-    if parameters.row != 0u {
-        index = vec2(low % parameters.row, parameters.first.y + low / parameters.row);
-    }
+    let index = indices[i]; // if listed
+    let low = parameters.first.x + i; // if ranged
+    let carry = select(0u, 1u, low < i); // if ranged
+    var index = vec2(low, parameters.first.y + carry); // if ranged
+    if parameters.row != 0u { // if ranged
+        index = vec2(low % parameters.row, parameters.first.y + low / parameters.row); // if ranged
+    } // if ranged
     return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts); // if whole
     let before = progress[i]; // if sliced
     let attempts = attempts_of(before); // if sliced

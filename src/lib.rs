@@ -43,6 +43,13 @@ pub mod export;
 #[doc(hidden)]
 pub mod evaluation;
 
+// The program, which other hosts may carry as well, as the Python package does. It names the library as they do.
+#[cfg(feature = "cli")]
+extern crate self as spectroll;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;
+
 pub use dataset::{
     BuiltinTable, Dataset, DatasetError, Decimal, Missing, ReadOptions, Reading, Remedy, ResampleMethod,
     Resampling, Separator, SpectraCounts, SpectrumKind, Table, TableLayout, Unphysical, WavelengthUnit,
@@ -57,7 +64,7 @@ pub use program::Bounds;
 pub use quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
 pub use random::philox::philox;
 pub use random::real::Real;
-pub use random::stream::{DrawRange, Stream, StreamRng};
+pub use random::stream::{DrawRange, Draws, Stream, StreamRng};
 pub use recipe::{
     CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Illuminant, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder,
     RecipeError, RecipeSettings, ScalarSampler, XyzScale,

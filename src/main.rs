@@ -1,12 +1,10 @@
 //! The `spectroll` program. See `spectroll --help`, and the library's documentation for everything below the surface.
 
-mod cli;
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     quiet_drivers();
-    cli::main()
+    ExitCode::from(spectroll::cli::main(std::env::args_os().collect()))
 }
 
 /// Silences Mesa's software driver, which complains on standard error where the variable is unset, as in containers.

@@ -6,12 +6,17 @@ use wgpu::{BufferUsages, Device};
 
 use crate::program::Program;
 use crate::quantity::{ArrayFormat, Quantity};
-use crate::random::stream::DrawRange;
+use crate::random::stream::{DrawRange, Draws};
 use crate::recipe::Recipe;
-use crate::wgsl::{self, COVER_AT, Dialect, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT, TABLES_AT, Tables};
+use crate::wgsl::{
+    self, COVER_AT, Dialect, INDICES_AT, Indexing, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT, TABLES_AT, Tables,
+};
 
 /// The most dispatches that are recorded for one range: its draws take no more candidates than these try.
 const MOST_SLICES: u32 = 1024;
+
+/// Bytes of an index.
+const INDEX_BYTES: u64 = 8;
 
 /// A recipe's compute pipeline on a wgpu device, to be recorded into its host's command encoders.
 ///
@@ -46,6 +51,7 @@ pub struct Sampler {
     /// Number of candidates of a draw that one dispatch tries.
     slice: u32,
     draws_per_thread: u32,
+    indexing: Indexing,
 }
 
 /// Error returned where something cannot be drawn on a device, or not in one dispatch.
@@ -104,9 +110,18 @@ impl Sampler {
 
     /// Compiles the shader of a program.
     pub(crate) fn of(device: &Device, program: &Program) -> Result<Sampler, SamplerError> {
+        Sampler::indexed(device, program, Indexing::Range)
+    }
+
+    /// Compiles the shader of a program for draws whose indices are given in this way.
+    pub(crate) fn indexed(
+        device: &Device,
+        program: &Program,
+        indexing: Indexing,
+    ) -> Result<Sampler, SamplerError> {
         let target = Sampler::target(device);
-        let (text, tables) = wgsl::shader(program, target);
-        Sampler::with_text(device, program, target, text, &tables)
+        let (text, tables) = wgsl::shader_of(program, target, indexing);
+        Sampler::with_text(device, program, target, (text, indexing), &tables)
     }
 
     /// Compiles the shader that was written for a program, and puts the numbers that it reads into buffers.
@@ -114,15 +129,19 @@ impl Sampler {
         device: &Device,
         program: &Program,
         target: Dialect,
-        text: String,
+        (text, indexing): (String, Indexing),
         tables: &Tables,
     ) -> Result<Sampler, SamplerError> {
         let slice = wgsl::attempts_per_dispatch(program, target);
         if slice == 0 {
             return Err(SamplerError::TooManyBands(program.bands()));
         }
-        let others =
-            [!tables.values.is_empty(), program.proposal.is_some(), wgsl::is_sliced(program, target)];
+        let others = [
+            !tables.values.is_empty(),
+            program.proposal.is_some(),
+            wgsl::is_sliced(program, target),
+            indexing == Indexing::List,
+        ];
         let buffers = (program.outputs.len() + others.into_iter().filter(|&there| there).count()) as u32;
         let largest = device.limits().max_storage_buffers_per_shader_stage;
         if buffers > largest {
@@ -155,6 +174,7 @@ impl Sampler {
             max_attempts: program.max_attempts,
             slice,
             draws_per_thread: wgsl::draws_per_thread(program, target),
+            indexing,
         })
     }
 
@@ -186,7 +206,9 @@ impl Sampler {
     /// Largest number of draws in one dispatch, and the name of the limit that sets it.
     fn limit(&self, limits: &wgpu::Limits) -> (u64, &'static str) {
         // Four draws, for which padding comes to nothing.
-        let four = self.formats.iter().map(|format| format.bytes(4)).max().expect("something comes out");
+        let indices = if self.indexing == Indexing::List { 4 * INDEX_BYTES } else { 0 };
+        let four = self.formats.iter().map(|format| format.bytes(4)).chain([indices]);
+        let four = four.max().expect("something comes out");
         let values = self.formats.iter().map(|format| format.values(4)).max().expect("something comes out");
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(wgsl::WORKGROUP);
         [
@@ -242,11 +264,20 @@ impl Sampler {
                 mapped_at_creation: false,
             })
         });
+        let indices = (self.indexing == Indexing::List).then(|| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("spectroll indices"),
+                size: INDEX_BYTES * capacity,
+                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        });
         let at = |format: &ArrayFormat| OUTPUTS_AT + format.quantity as u32;
         let entries: Vec<_> = std::iter::once((PARAMETERS_AT, &parameters))
             .chain(self.tables.iter().map(|tables| (TABLES_AT, tables)))
             .chain(self.cover.iter().map(|cover| (COVER_AT, cover)))
             .chain(progress.iter().map(|progress| (PROGRESS_AT, progress)))
+            .chain(indices.iter().map(|indices| (INDICES_AT, indices)))
             .chain(self.formats.iter().map(at).zip(&outputs))
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
@@ -256,7 +287,16 @@ impl Sampler {
             entries: &entries,
         });
         let (count, prepared) = (draws.count, draws.count);
-        Ok(Prepared { sampler: self.clone(), bindings, parameters, progress, outputs, count, prepared })
+        Ok(Prepared {
+            sampler: self.clone(),
+            bindings,
+            parameters,
+            progress,
+            indices,
+            outputs,
+            count,
+            prepared,
+        })
     }
 
     fn parameters(&self, draws: DrawRange) -> Parameters {
@@ -312,6 +352,8 @@ pub struct Prepared {
     parameters: wgpu::Buffer,
     /// Progress of each draw, where one dispatch may not end them all.
     progress: Option<wgpu::Buffer>,
+    /// Indices of the draws, where they are given in a list.
+    indices: Option<wgpu::Buffer>,
     /// Buffers, in the order of the sampler's formats.
     outputs: Vec<wgpu::Buffer>,
     count: u64,
@@ -393,6 +435,14 @@ impl Prepared {
         self.count = draws.count;
         queue.write_buffer(&self.parameters, 0, bytemuck::bytes_of(&self.sampler.parameters(draws)));
         Ok(())
+    }
+
+    /// Writes the indices of draws, for a shader that has them from a list: no more than were prepared.
+    pub(crate) fn set_indices(&self, queue: &wgpu::Queue, draws: Draws) {
+        let Some(buffer) = &self.indices else { return };
+        let words = |number| draws.range.stream.index_words(draws.index(number));
+        let words: Vec<[u32; 2]> = (0..draws.count()).map(words).collect();
+        queue.write_buffer(buffer, 0, bytemuck::cast_slice(&words));
     }
 }
 

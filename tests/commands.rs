@@ -4,7 +4,8 @@
 //!
 //! - of a block of `sh`, the lines that start `spectroll` are run, one after the other, and must succeed;
 //! - a block of `toml` or `csv` is written to the file that its first line names, as in `# mine.csv`;
-//! - a block of `python` is run, and may look at the files that the commands before it left;
+//! - a block of `python` is run, and may look at the files that the commands before it left, but for those that import
+//!   the package of this project: `python/tests` runs these;
 //! - blocks of `rust` are doctests, and those of `wgsl` and `text` are left alone.
 //!
 //! Commands are run as they stand, but for their size: [`lowered`] says how. Lines of other programs are left alone if
@@ -106,6 +107,7 @@ fn steps(text: &str) -> Result<Vec<(usize, Step)>, String> {
                     name.ok_or(format!("{line}: the first line must name the file, as in `# a.{language}`"))?;
                 steps.push((line, Step::Write { name: name.to_owned(), text: text.clone() }));
             }
+            "python" if text.contains("import spectroll") => {}
             "python" => steps.push((line, Step::Python(text))),
             "rust" | "wgsl" | "text" => {}
             other => return Err(format!("{line}: a block of {other:?} is not known here")),

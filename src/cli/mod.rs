@@ -30,8 +30,8 @@ mod shader;
 mod verify;
 mod wavelengths;
 
+use std::ffi::OsString;
 use std::path::Path;
-use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use spectroll::output::IfExists;
@@ -94,9 +94,10 @@ enum Command {
     Man(packaging::ManArguments),
 }
 
-/// Runs the program.
-pub(crate) fn main() -> ExitCode {
-    let result = options::config::expand(&Arguments::command(), std::env::args_os().collect());
+/// Runs the program with the words of a command line, the first of which is its own name. Returns the exit code, but for
+/// help and mistakes in the words, which end the process.
+pub fn main(words: Vec<OsString>) -> u8 {
+    let result = options::config::expand(&Arguments::command(), words);
     let mut looks = false;
     let result = result.map_err(anyhow::Error::from).and_then(|words| {
         let command = Arguments::parse_from(words).command;
@@ -104,8 +105,8 @@ pub(crate) fn main() -> ExitCode {
         run(command)
     });
     match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) if exit::is_broken_pipe(&error) => ExitCode::SUCCESS, // the reader has what it wanted
+        Ok(()) => 0,
+        Err(error) if exit::is_broken_pipe(&error) => 0, // the reader has what it wanted
         Err(error) => {
             // Our messages hold their causes.
             match exit::data_remedy(&error) {
@@ -115,7 +116,7 @@ pub(crate) fn main() -> ExitCode {
                 }
                 None => tell!("error: {error}{}", exit::remedy(&error)),
             }
-            ExitCode::from(exit::code(&error))
+            exit::code(&error)
         }
     }
 }

@@ -10,7 +10,7 @@ use super::lanes::Done;
 use super::{Candidates, Kernel, Take, Value};
 use crate::draw_status::DrawStatus;
 use crate::quantity::{ArrayFormat, Dtype, Layout, ValueRange};
-use crate::random::stream::DrawRange;
+use crate::random::stream::Draws;
 
 /// Number of lanes of the f32 engine: a vector register of AVX-512, two of AVX2.
 const LANES: usize = 16;
@@ -25,21 +25,38 @@ struct Column<'a> {
     planes: Vec<&'a mut [u32]>,
 }
 
-/// Draws a range in f32, in order, on all cores. Each array has the words of one output, and is as long as
-/// [`ArrayFormat::bytes`] says. Padding is left as it is.
-pub(crate) fn fill(kernel: &Kernel<f32>, draws: DrawRange, arrays: &mut [&mut [u32]]) {
-    let count = draws.count as usize;
+/// Makes draws in f32, in order, on the threads of the pool in which this is called. Each array has the words of one
+/// output, and is as long as [`ArrayFormat::bytes`] says. Padding is left as it is.
+pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]) {
+    let count = draws.count() as usize;
     let size = (count / (4 * rayon::current_num_threads())).clamp(8 * LANES, CHUNK).next_multiple_of(4);
+    let chunks = chunks(kernel, (count, size), arrays);
+    chunks.into_par_iter().enumerate().for_each(|(chunk, columns)| {
+        let first = chunk * size;
+        fill_chunk(kernel, draws.part(first as u64, size.min(count - first) as u64), columns);
+    });
+}
+
+/// Makes draws as [`fill`] does, on this thread alone.
+pub(crate) fn fill_here(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]) {
+    let count = draws.count() as usize;
+    let size = count.next_multiple_of(4).max(4);
+    chunks(kernel, (count, size), arrays).into_iter().for_each(|columns| fill_chunk(kernel, draws, columns));
+}
+
+/// The columns of each `size` of `count` draws.
+fn chunks<'a>(
+    kernel: &Kernel<f32>,
+    (count, size): (usize, usize),
+    arrays: &'a mut [&mut [u32]],
+) -> Vec<Vec<Column<'a>>> {
     let mut chunks: Vec<Vec<Column>> = (0..count.div_ceil(size)).map(|_| Vec::new()).collect();
     for (output, words) in kernel.outputs.iter().zip(arrays) {
         for (chunk, column) in chunks.iter_mut().zip(split(output.format, words, count, size)) {
             chunk.push(column);
         }
     }
-    chunks.into_par_iter().enumerate().for_each(|(chunk, columns)| {
-        let first = chunk * size;
-        fill_chunk(kernel, draws.part(first as u64, size.min(count - first) as u64), columns);
-    });
+    chunks
 }
 
 /// The columns of each `size` draws, a multiple of 4.
@@ -61,12 +78,12 @@ fn split(format: ArrayFormat, words: &mut [u32], count: usize, size: usize) -> V
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx2+bmi2+fma",
     "x86_64+avx2+bmi2+fma"
 ))]
-fn fill_chunk(kernel: &Kernel<f32>, draws: DrawRange, columns: Vec<Column>) {
+fn fill_chunk(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
     fill_in_lanes::<LANES>(kernel, draws, columns);
 }
 
 #[inline(always)]
-fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: DrawRange, columns: Vec<Column>) {
+fn fill_in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: Draws, columns: Vec<Column>) {
     let widest = kernel.outputs.iter().map(|output| output.format.width).max().unwrap_or(0);
     let row = vec![0.0; widest.next_multiple_of(8)];
     let halves = vec![f16::ZERO; row.len()];
@@ -186,7 +203,7 @@ mod tests {
     use crate::model::Model;
     use crate::program::Bounds;
     use crate::quantity::Quantity;
-    use crate::random::stream::Stream;
+    use crate::random::stream::{DrawRange, Stream};
     use crate::recipe::{Intensity, Recipe, RecipeBuilder};
 
     /// Recipes of every kind, some of whose draws fail.
@@ -234,6 +251,7 @@ mod tests {
     fn in_lanes<const L: usize>(kernel: &Kernel<f32>, draws: DrawRange) -> Vec<Vec<u32>> {
         let mut arrays = arrays(kernel, draws.count);
         let count = draws.count as usize;
+        let draws = draws.into();
         let all = count.next_multiple_of(4).max(4);
         let columns = kernel.outputs.iter().zip(&mut arrays);
         let columns = columns.flat_map(|(output, words)| split(output.format, words, count, all)).collect();
@@ -265,10 +283,13 @@ mod tests {
                 let draws = Stream::new(2).draws(0..count);
                 let mut filled = arrays(&kernel, count);
                 let mut slices: Vec<_> = filled.iter_mut().map(Vec::as_mut_slice).collect();
-                fill(&kernel, draws, &mut slices);
-                assert!(
-                    filled == if count == 0 { arrays(&kernel, 0) } else { in_lanes::<1>(&kernel, draws) }
-                );
+                fill(&kernel, draws.into(), &mut slices);
+                let expected = if count == 0 { arrays(&kernel, 0) } else { in_lanes::<1>(&kernel, draws) };
+                assert!(filled == expected);
+                let mut filled = arrays(&kernel, count);
+                let mut slices: Vec<_> = filled.iter_mut().map(Vec::as_mut_slice).collect();
+                fill_here(&kernel, draws.into(), &mut slices);
+                assert!(filled == expected);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::Verdicts;
 use crate::draw_status::DrawStatus;
-use crate::random::stream::{Attempts, DrawRange};
+use crate::random::stream::{Attempts, Draws};
 
 /// A draw that is done, and the lane of the candidates that it is in. Where it failed they are those of its last
 /// attempt.
@@ -15,8 +15,8 @@ pub(super) struct Done {
 }
 
 /// Lanes that share the work on some draws: one that is done takes the next.
-pub(super) struct Lanes<const L: usize> {
-    draws: DrawRange,
+pub(super) struct Lanes<'a, const L: usize> {
+    draws: Draws<'a>,
     /// The number of each lane's draw, from the first on.
     numbers: [u64; L],
     /// Its index, low words and high ones.
@@ -30,9 +30,9 @@ pub(super) struct Lanes<const L: usize> {
     done: [Done; L],
 }
 
-impl<const L: usize> Lanes<L> {
+impl<'a, const L: usize> Lanes<'a, L> {
     #[inline(always)]
-    pub(super) fn new(draws: DrawRange) -> Self {
+    pub(super) fn new(draws: Draws<'a>) -> Self {
         const { assert!(0 < L && L <= 64, "a lane is a bit of a word") };
         let mut lanes = Lanes {
             draws,
@@ -57,7 +57,7 @@ impl<const L: usize> Lanes<L> {
     /// Source of the words of the next candidates.
     #[inline(always)]
     pub(super) fn words(&self) -> Attempts<L> {
-        Attempts { stream: self.draws.stream, index: self.index, attempts: self.attempts }
+        Attempts { stream: self.draws.range.stream, index: self.index, attempts: self.attempts }
     }
 
     /// Counts an attempt in each lane. Those whose candidate was accepted or was the last allowed are done, and go on
@@ -88,12 +88,12 @@ impl<const L: usize> Lanes<L> {
 
     #[inline(always)]
     fn take_next(&mut self, lane: usize) {
-        if self.next >= self.draws.count {
+        if self.next >= self.draws.range.count {
             self.busy &= !(1 << lane);
         }
         self.numbers[lane] = self.next;
         self.attempts[lane] = 0;
-        let [low, high] = self.draws.stream.index_words(self.draws.first.wrapping_add(self.next));
+        let [low, high] = self.draws.range.stream.index_words(self.draws.index(self.next));
         self.index[0][lane] = low;
         self.index[1][lane] = high;
         self.next += 1;

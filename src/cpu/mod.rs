@@ -17,7 +17,7 @@ mod intensity;
 mod lanes;
 mod target;
 
-pub(crate) use columns::fill;
+pub(crate) use columns::{fill, fill_here};
 
 use lanes::{Done, Lanes};
 use target::LrvTarget;
@@ -29,7 +29,7 @@ use crate::draw_status::DrawStatus;
 use crate::program::{self, IntensityLaw, Program, Source};
 use crate::quantity::{ArrayFormat, ValueRange};
 use crate::random::real::Real;
-use crate::random::stream::{self, Attempts, Blocks, DrawRange, Stream};
+use crate::random::stream::{self, Attempts, Blocks, DrawRange, Draws, Stream};
 
 /// A [`Program`] with its numbers rounded to `R`.
 pub(crate) struct Kernel<R> {
@@ -173,7 +173,7 @@ impl<R: Real> Kernel<R> {
             }
         }
         let mut only = Only(self, None);
-        self.in_lanes(DrawRange { stream, first: index, count: 1 }, &mut only);
+        self.in_lanes(DrawRange { stream, first: index, count: 1 }.into(), &mut only);
         only.1.expect("one draw was asked for")
     }
 
@@ -209,9 +209,9 @@ impl<R: Real> Kernel<R> {
         values.collect()
     }
 
-    /// Draws a range; each draw goes to `to` when it is done.
+    /// Makes draws; each goes to `to` when it is done.
     #[inline(always)]
-    fn in_lanes<const L: usize>(&self, draws: DrawRange, to: &mut impl Take<R, L>) {
+    fn in_lanes<const L: usize>(&self, draws: Draws, to: &mut impl Take<R, L>) {
         let mut candidates = self.candidates::<L>();
         let mut lanes = Lanes::new(draws);
         while lanes.are_busy() {

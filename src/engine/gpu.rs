@@ -9,8 +9,9 @@ use wgpu::{BufferUsages, Features, PollType};
 use super::schedule::{Job, Pace, Window};
 use super::{Adapter, Batch, EngineError};
 use crate::quantity::Quantity;
-use crate::random::stream::DrawRange;
+use crate::random::stream::{DrawRange, Draws};
 use crate::sampler::{Prepared, Sampler};
+use crate::wgsl::Indexing;
 
 /// Number of windows in flight: one with the caller, one being computed, one waiting to be.
 const RING: usize = 3;
@@ -124,20 +125,20 @@ struct ReadyJob {
 }
 
 impl<'a> GpuSchedule<'a> {
-    pub(super) fn new(gpu: &'a Gpu, jobs: &[Job]) -> Result<Self, EngineError> {
+    pub(super) fn new(gpu: &'a Gpu, jobs: &[Job], indexing: Indexing) -> Result<Self, EngineError> {
         let mut roles: Vec<ReadyJob> = Vec::new();
         for (i, job) in jobs.iter().enumerate() {
             let program = job.recipe.program();
             let sampler = match jobs[..i].iter().position(|other| other.recipe.program() == program) {
                 Some(other) => roles[other].sampler.clone(),
-                None => Sampler::of(&gpu.device, &program.with_status())?,
+                None => Sampler::indexed(&gpu.device, &program.with_status(), indexing)?,
             };
             roles.push(ReadyJob { sampler, per_step: job.per_step });
         }
         let limits = gpu.device.limits();
         let most = roles.iter().map(|role| role.sampler.max_count(&limits) / role.per_step).min();
         let most = most.expect("an ensemble has jobs");
-        let single = |job: &Job| GpuSchedule::new(gpu, &[Job { per_step: 1, ..*job }]);
+        let single = |job: &Job| GpuSchedule::new(gpu, &[Job { per_step: 1, ..*job }], indexing);
         let is_too_large = most == 0 && jobs.iter().any(|job| job.per_step > 1);
         let parts =
             if is_too_large { jobs.iter().map(single).collect::<Result<_, _>>()? } else { Vec::new() };
@@ -147,7 +148,7 @@ impl<'a> GpuSchedule<'a> {
 
     pub(super) fn draw<E: From<EngineError>>(
         &mut self,
-        draws: &[DrawRange],
+        draws: &[Draws],
         steps: u64,
         sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -160,7 +161,7 @@ impl<'a> GpuSchedule<'a> {
     /// Draws windows of whole steps.
     fn draw_windows<E: From<EngineError>>(
         &mut self,
-        draws: &[DrawRange],
+        draws: &[Draws],
         steps: u64,
         sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -196,7 +197,7 @@ impl<'a> GpuSchedule<'a> {
     /// Draws each step in as many dispatches as it takes, and hands it over as a whole.
     fn draw_in_parts<E: From<EngineError>>(
         &mut self,
-        draws: &[DrawRange],
+        draws: &[Draws],
         steps: u64,
         sink: &mut impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -207,7 +208,7 @@ impl<'a> GpuSchedule<'a> {
                 let range = window.of(*draws, job.per_step);
                 let formats = job.sampler.formats();
                 let mut arrays = vec![Vec::new(); formats.len()];
-                part.draw_windows::<EngineError>(&[range], range.count, &mut |batches: &[Batch]| {
+                part.draw_windows::<EngineError>(&[range], range.count(), &mut |batches: &[Batch]| {
                     for (array, format) in arrays.iter_mut().zip(formats) {
                         array.extend_from_slice(batches[0].bytes(format.quantity));
                     }
@@ -218,7 +219,7 @@ impl<'a> GpuSchedule<'a> {
             let mut batches = Vec::new();
             for (range, formats, arrays) in &all {
                 batches.push(Batch::new(
-                    *range,
+                    range.range,
                     formats,
                     arrays.iter().map(|array: &Vec<u8>| array.as_slice()),
                 ));
@@ -229,7 +230,7 @@ impl<'a> GpuSchedule<'a> {
     }
 
     /// Allocates slots for windows of this number of steps. An error while drawing loses some of them.
-    fn make_room(&mut self, draws: &[DrawRange], steps: u64) -> Result<(), EngineError> {
+    fn make_room(&mut self, draws: &[Draws], steps: u64) -> Result<(), EngineError> {
         let needed = self.pace.most.min(steps);
         if self.capacity < needed {
             self.slots.clear();
@@ -264,10 +265,10 @@ struct Flight {
 }
 
 impl Slot {
-    fn new(gpu: &Gpu, jobs: &[ReadyJob], draws: &[DrawRange], window: Window) -> Result<Slot, EngineError> {
+    fn new(gpu: &Gpu, jobs: &[ReadyJob], draws: &[Draws], window: Window) -> Result<Slot, EngineError> {
         let usage = if gpu.shared_memory { BufferUsages::MAP_READ } else { BufferUsages::COPY_SRC };
-        let prepare = |(job, draws): (&ReadyJob, &DrawRange)| {
-            job.sampler.prepare_for(&gpu.device, window.of(*draws, job.per_step), usage)
+        let prepare = |(job, draws): (&ReadyJob, &Draws)| {
+            job.sampler.prepare_for(&gpu.device, window.of(*draws, job.per_step).range, usage)
         };
         let prepared = jobs.iter().zip(draws).map(prepare).collect::<Result<Vec<_>, _>>()?;
         let copy = |buffer: &wgpu::Buffer| {
@@ -283,12 +284,14 @@ impl Slot {
         Ok(Slot { prepared, staging })
     }
 
-    fn submit(mut self, gpu: &Gpu, draws: Vec<DrawRange>) -> Flight {
+    fn submit(mut self, gpu: &Gpu, draws: Vec<Draws>) -> Flight {
         let mut encoder = gpu.encoder();
         for (prepared, draws) in self.prepared.iter_mut().zip(&draws) {
-            prepared.set_draws(&gpu.queue, *draws).expect("a window has no more steps than a slot");
+            prepared.set_draws(&gpu.queue, draws.range).expect("a window has no more steps than a slot");
+            prepared.set_indices(&gpu.queue, *draws);
             prepared.record_first(&mut encoder);
         }
+        let draws = draws.iter().map(|draws| draws.range).collect();
         self.fly(gpu, encoder, draws, 1)
     }
 

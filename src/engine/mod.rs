@@ -25,7 +25,7 @@ pub use session::Session;
 
 use crate::draw_status::DrawStatus;
 use crate::quantity::{ArrayFormat, Dtype, Quantity};
-use crate::random::stream::DrawRange;
+use crate::random::stream::{DrawRange, Draws};
 use crate::recipe::Recipe;
 use crate::sampler::SamplerError;
 use crate::threads::{self, ThreadError};
@@ -125,14 +125,13 @@ pub struct Engine {
 #[derive(Debug)]
 enum Device {
     Gpu(gpu::Gpu),
-    /// Threads of its own: those of a caller might all be waiting for their draws.
-    Cpu(Arc<rayon::ThreadPool>),
+    Cpu(cpu::Threads),
 }
 
 /// A window of draws, as the caller receives them: an array for each quantity that the recipe asks for, and statuses.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
-    /// Range of the draws.
+    /// Range of the draws; of those of a list ([`Stream::at`](crate::Stream::at)) it has their places in the list.
     pub draws: DrawRange,
     formats: &'a [ArrayFormat],
     /// The bytes of each quantity.
@@ -215,9 +214,11 @@ impl DrawSummary {
         (self.attempts > 0).then(|| self.draws as f64 / self.attempts as f64)
     }
 
-    fn add(&mut self, batch: &Batch, max_attempts: u32) -> Result<(), EngineError> {
+    /// Adds a batch of draws, all of which must have succeeded.
+    fn add(&mut self, batch: &Batch, draws: Draws, max_attempts: u32) -> Result<(), EngineError> {
         if let Some(failed) = batch.statuses().iter().position(|t| t.attempts() == 0) {
-            let index = batch.draws.first.wrapping_add(failed as u64);
+            let before = batch.draws.first.wrapping_sub(draws.range.first);
+            let index = draws.index(before.wrapping_add(failed as u64));
             return Err(EngineError::Exhausted { index, attempts: max_attempts });
         }
         self.count(batch.statuses());
@@ -247,7 +248,8 @@ impl Engine {
     }
 
     /// Opens the engine of `choice`; if that is the CPU, with this number of threads, or one per core where it is
-    /// `None`.
+    /// `None`. One thread is that of the caller: several callers then draw at the same time, each on its own, and no
+    /// thread is kept that the child of a fork would wait for.
     pub fn with_threads(choice: &EngineChoice, threads: Option<NonZeroUsize>) -> Result<Engine, EngineError> {
         let adapter = match choice {
             EngineChoice::Cpu => None,
@@ -259,7 +261,7 @@ impl Engine {
         };
         let device = match adapter {
             Some(adapter) => Device::Gpu(gpu::Gpu::open(adapter)?),
-            None => Device::Cpu(Arc::new(threads::pool(threads)?)),
+            None => Device::Cpu(cpu::Threads::new(threads)?),
         };
         Ok(Engine { device })
     }
@@ -276,7 +278,7 @@ impl Engine {
     pub(crate) fn pool(&self) -> Result<Arc<rayon::ThreadPool>, EngineError> {
         match &self.device {
             Device::Gpu(_) => Ok(Arc::new(threads::pool(None)?)),
-            Device::Cpu(pool) => Ok(pool.clone()),
+            Device::Cpu(threads) => threads.pool(),
         }
     }
 
@@ -324,8 +326,31 @@ impl fmt::Display for Engine {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match &self.device {
             Device::Gpu(gpu) => gpu.adapter().fmt(f),
-            Device::Cpu(pool) if pool.current_num_threads() == 1 => f.write_str("CPU (1 thread)"),
-            Device::Cpu(pool) => write!(f, "CPU ({} threads)", pool.current_num_threads()),
+            Device::Cpu(threads) if threads.count() == 1 => f.write_str("CPU (1 thread)"),
+            Device::Cpu(threads) => write!(f, "CPU ({} threads)", threads.count()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::stream::Stream;
+
+    #[test]
+    fn a_draw_that_failed_is_named_by_its_index() {
+        let formats = [ArrayFormat::status()];
+        let statuses = [DrawStatus::accepted(1, false), DrawStatus::FAILED];
+        let failed = |draws: Draws, window: DrawRange| {
+            let batch = Batch::new(window, &formats, [bytemuck::cast_slice(&statuses)]);
+            match DrawSummary::default().add(&batch, draws, 9) {
+                Err(EngineError::Exhausted { index, attempts: 9 }) => index,
+                other => panic!("{other:?}"),
+            }
+        };
+        let stream = Stream::new(0);
+        assert_eq!(failed(stream.draws(100..200).into(), stream.draws(150..152)), 151);
+        let list = stream.at(&[10, 20, 30, 40]);
+        assert_eq!(failed(list, list.part(2, 2).range), 40);
     }
 }

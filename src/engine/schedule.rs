@@ -4,8 +4,9 @@ use std::time::{Duration, Instant};
 
 use super::{Batch, Device, Engine, EngineError, cpu, gpu};
 use crate::quantity::ArrayFormat;
-use crate::random::stream::DrawRange;
+use crate::random::stream::Draws;
 use crate::recipe::Recipe;
+use crate::wgsl::Indexing;
 
 /// Largest size of a quantity in one window, in bytes: all windows in flight stay in a cache of 32 MiB.
 const WINDOW_BYTES: u64 = 8 << 20;
@@ -15,11 +16,16 @@ const WINDOW_BYTES: u64 = 8 << 20;
 const WINDOW_TIME: Duration = Duration::from_millis(60);
 
 impl Engine {
-    /// Prepares to draw from several recipes at once. Jobs of one recipe share its shader.
+    /// Prepares to draw ranges from several recipes at once. Jobs of one recipe share its shader.
     pub(crate) fn schedule(&self, jobs: &[Job]) -> Result<Schedule<'_>, EngineError> {
+        self.schedule_of(jobs, Indexing::Range)
+    }
+
+    /// Prepares to make draws whose indices are given in this way. On the CPU that makes no difference.
+    pub(super) fn schedule_of(&self, jobs: &[Job], indexing: Indexing) -> Result<Schedule<'_>, EngineError> {
         Ok(Schedule(match &self.device {
-            Device::Gpu(gpu) => Backend::Gpu(gpu::GpuSchedule::new(gpu, jobs)?),
-            Device::Cpu(pool) => Backend::Cpu(cpu::CpuSchedule::new(pool, jobs)),
+            Device::Gpu(gpu) => Backend::Gpu(gpu::GpuSchedule::new(gpu, jobs, indexing)?),
+            Device::Cpu(threads) => Backend::Cpu(cpu::CpuSchedule::new(threads, jobs)),
         }))
     }
 }
@@ -45,7 +51,7 @@ impl Schedule<'_> {
     /// window is one submission for all jobs. Draws that failed raise no error.
     pub(crate) fn draw<E: From<EngineError>>(
         &mut self,
-        draws: &[DrawRange],
+        draws: &[Draws],
         steps: u64,
         mut sink: impl FnMut(&[Batch]) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -102,7 +108,7 @@ pub(super) struct Window {
 
 impl Window {
     /// The part of a job's draws.
-    pub(super) fn of(self, draws: DrawRange, per_step: u64) -> DrawRange {
+    pub(super) fn of(self, draws: Draws<'_>, per_step: u64) -> Draws<'_> {
         draws.part(self.offset * per_step, self.steps * per_step)
     }
 }

@@ -16,7 +16,7 @@ use crate::random::stream::Stream;
 use crate::recipe::{Recipe, RecipeError};
 use crate::sampler::{Prepared, Sampler};
 pub use crate::wgsl::Part;
-use crate::wgsl::shader_without;
+use crate::wgsl::{Indexing, shader_without};
 
 /// Draws per dispatch. Their spectra stay below the least size of a buffer that a device may offer.
 const COUNT: u64 = 1 << 19;
@@ -125,7 +125,7 @@ fn never_rejected(model: &Model) -> Result<Program, RecipeError> {
 fn sampler(device: &Device, program: &Program, part: Option<Part>) -> Result<Sampler, EngineError> {
     let target = Sampler::target(device);
     let (text, tables) = shader_without(program, target, part);
-    Ok(Sampler::with_text(device, program, target, text, &tables)?)
+    Ok(Sampler::with_text(device, program, target, (text, Indexing::Range), &tables)?)
 }
 
 #[cfg(test)]

@@ -116,6 +116,12 @@ impl Stream {
         DrawRange { stream: self, first, count }
     }
 
+    /// The draws of a list of indices, in its order: any indices, any number of times.
+    pub fn at(self, indices: &[u64]) -> Draws<'_> {
+        let range = DrawRange { stream: self, first: 0, count: indices.len() as u64 };
+        Draws { range, indices: Some(indices) }
+    }
+
     /// A sequential generator over the stream, for code that wants one of `rand`'s. Its words are not those of any
     /// draw of the stream.
     pub fn rng(self) -> StreamRng {
@@ -176,6 +182,42 @@ impl DrawRange {
     /// The part of the range that starts `offset` draws in and has `count` of them.
     pub(crate) fn part(&self, offset: u64, count: u64) -> DrawRange {
         DrawRange { first: self.first.wrapping_add(offset), count, ..*self }
+    }
+}
+
+/// Draws of a stream: those of a [`DrawRange`], or those of a list of indices ([`Stream::at`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Draws<'a> {
+    /// The range; where there is a list, its indices are places in the list.
+    pub(crate) range: DrawRange,
+    pub(crate) indices: Option<&'a [u64]>,
+}
+
+impl From<DrawRange> for Draws<'_> {
+    fn from(range: DrawRange) -> Self {
+        Draws { range, indices: None }
+    }
+}
+
+impl<'a> Draws<'a> {
+    /// Number of draws.
+    pub fn count(&self) -> u64 {
+        self.range.count
+    }
+
+    /// The index of the draw of this number, from 0. Beyond the last there is some other draw.
+    #[inline(always)]
+    pub(crate) fn index(&self, number: u64) -> u64 {
+        let place = self.range.first.wrapping_add(number);
+        match self.indices {
+            None => place,
+            Some(indices) => indices.get(place as usize).copied().unwrap_or(0),
+        }
+    }
+
+    /// The part of the draws that starts `offset` in and has `count` of them.
+    pub fn part(&self, offset: u64, count: u64) -> Draws<'a> {
+        Draws { range: self.range.part(offset, count), ..*self }
     }
 }
 
@@ -246,6 +288,16 @@ mod tests {
         assert_eq!(parts(stream.draws(u64::MAX - 2..=u64::MAX)), (u64::MAX - 2, 3));
         assert_eq!(parts(stream.draws(5..5)), (5, 0));
         assert_eq!(parts(stream.draws(3..10).part(2, 4)), (5, 4));
+    }
+
+    #[test]
+    fn lists_of_draws() {
+        let stream = Stream::new(1);
+        let list = stream.at(&[7, u64::MAX, 7]);
+        let indices = |draws: Draws| (0..draws.count()).map(|n| draws.index(n)).collect::<Vec<_>>();
+        assert_eq!(indices(list), [7, u64::MAX, 7]);
+        assert_eq!(indices(list.part(1, 2)), [u64::MAX, 7]);
+        assert_eq!(indices(Draws::from(stream.draws(3..6)).part(1, 2)), [4, 5]);
     }
 
     #[test]

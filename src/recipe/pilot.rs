@@ -1,10 +1,9 @@
 //! Pilot run, which estimates the acceptance before any work starts.
 
-use rayon::prelude::*;
-
 use crate::cpu::Kernel;
 use crate::program::Program;
 use crate::random::stream::Stream;
+use crate::threads;
 
 /// Number of candidates of a pilot run.
 pub(super) const PILOT: u64 = 1 << 16;
@@ -12,6 +11,9 @@ pub(super) const PILOT: u64 = 1 << 16;
 /// Smallest number of whole draws for an estimate: enough for 1 part in 10, at some 10^6 candidates in the worst
 /// case.
 const LEAST_DRAWS: u64 = 256;
+
+/// Number of candidates that are worth a thread.
+const GRAIN: u64 = 1 << 12;
 
 /// The probability that a draw finds no candidate within its attempts, above which a recipe is refused: one failure
 /// in a data set of 10^12 draws.
@@ -22,8 +24,8 @@ pub(super) const TOLERABLE_FAILURE: f64 = 1e-12;
 pub(super) fn pilot(program: &Program) -> f64 {
     let kernel = Kernel::<f32>::new(program);
     let stream = Stream::named(0, "pilot");
-    let accepted = (0..PILOT).into_par_iter().filter(|&index| kernel.accepts(|b| stream.block(index, 0, b)));
-    accepted.count() as f64 / PILOT as f64
+    let accepted = threads::map(PILOT, GRAIN, |index| kernel.accepts(|b| stream.block(index, 0, b)));
+    accepted.into_iter().filter(|&accepted| accepted).count() as f64 / PILOT as f64
 }
 
 /// The share of accepted candidates among those of whole draws, each of which goes on until one meets its own target: a
@@ -33,11 +35,11 @@ pub(super) fn pilot_of_draws(program: &Program, least: f64) -> f64 {
     let kernel = Kernel::<f32>::new(program);
     let stream = Stream::named(0, "pilot");
     let draws = ((PILOT as f64 * least) as u64).max(LEAST_DRAWS);
-    let candidates = (0..draws).into_par_iter().map(|index| match kernel.draw(stream, index).1.attempts() {
+    let candidates = threads::map(draws, 1, |index| match kernel.draw(stream, index).1.attempts() {
         0 => u64::from(program.max_attempts),
         attempts => u64::from(attempts),
     });
-    draws as f64 / candidates.sum::<u64>() as f64
+    draws as f64 / candidates.into_iter().sum::<u64>() as f64
 }
 
 /// The probability that none of `attempts` candidates is accepted.

@@ -12,7 +12,7 @@ use crate::cpu::Kernel;
 use crate::draw_status::DrawStatus;
 use crate::engine::{Batch, DrawSummary, Engine, EngineError, Job, Schedule};
 use crate::quantity::Quantity;
-use crate::random::stream::DrawRange;
+use crate::random::stream::{DrawRange, Draws};
 
 use super::Scene;
 use super::group::IntensityScope;
@@ -206,6 +206,7 @@ impl SceneSession<'_> {
                         first: scenes.start * u64::from(drawing.places),
                         count: (scenes.end - scenes.start) * u64::from(drawing.places),
                     })
+                    .map(Draws::from)
                     .collect();
                 let places = drawings().next().map_or(1, |(_, drawing)| u64::from(drawing.places));
                 schedule.draw(&draws, scenes.end - scenes.start, |batches| {

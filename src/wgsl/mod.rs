@@ -32,7 +32,7 @@ pub(crate) use tables::Tables;
 pub(crate) use shader::generator;
 #[cfg(feature = "report")]
 pub(crate) use shader::shader_without;
-pub(crate) use shader::{attempts_per_dispatch, is_sliced, shader};
+pub(crate) use shader::{attempts_per_dispatch, is_sliced, shader, shader_of};
 
 use crate::program::Program;
 use crate::quantity::{Dtype, Quantity};
@@ -55,6 +55,9 @@ pub(crate) const COVER_AT: u32 = OUTPUTS_AT + Quantity::COUNT as u32;
 /// The binding of the progress of draws that one dispatch may not end.
 pub(crate) const PROGRESS_AT: u32 = COVER_AT + 1;
 
+/// The binding of the indices of draws, where these are given in a list.
+pub(crate) const INDICES_AT: u32 = PROGRESS_AT + 1;
+
 /// The most gains (bands x components) that are written out as constants. At this size lavapipe takes 2.5 s to
 /// compile the straight lines, which then run 7 times as fast as the loop: they pay from 2e5 draws on.
 const UNROLLED_GAINS: usize = 2048;
@@ -68,6 +71,15 @@ pub(crate) enum Dialect {
     Int64,
     /// A software adapter with `SHADER_INT64`.
     SoftwareInt64,
+}
+
+/// Source of the indices of draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Indexing {
+    /// A range, by its first index.
+    Range,
+    /// A list in a buffer: any indices in any order.
+    List,
 }
 
 /// Form in which a program's arithmetic is written.
@@ -234,9 +246,11 @@ mod tests {
                 (Dialect::Int64, Capabilities::SHADER_INT64),
                 (Dialect::SoftwareInt64, Capabilities::SHADER_INT64),
             ] {
-                let (text, _) = shader(&program, target);
-                if let Err(e) = validate(&text, needs) {
-                    panic!("{target:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
+                for indexing in [Indexing::Range, Indexing::List] {
+                    let (text, _) = shader_of(&program, target, indexing);
+                    if let Err(e) = validate(&text, needs) {
+                        panic!("{target:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
+                    }
                 }
             }
         }

@@ -2,7 +2,10 @@
 
 use super::arithmetic::{self, arithmetic};
 use super::store::store;
-use super::{Dialect, Form, PROGRESS_AT, Part, TABLES_AT, Tables, WORKGROUP, draws_per_thread, part};
+use super::{
+    Dialect, Form, INDICES_AT, Indexing, PROGRESS_AT, Part, TABLES_AT, Tables, WORKGROUP, draws_per_thread,
+    part,
+};
 use crate::program::{IntensityLaw, Program};
 use crate::quantity::Dtype;
 
@@ -77,20 +80,44 @@ fn generator_without(target: Dialect, part: Option<Part>) -> String {
     [mul_wide, philox, normal].join("\n")
 }
 
-/// The compute shader of a program, and the numbers that it reads.
+/// The compute shader of a program, for ranges of draws, and the numbers that it reads.
 pub(crate) fn shader(program: &Program, target: Dialect) -> (String, Tables) {
-    shader_without(program, target, None)
+    shader_of(program, target, Indexing::Range)
+}
+
+/// The compute shader of a program, for draws whose indices are given in this way, and the numbers that it reads.
+pub(crate) fn shader_of(program: &Program, target: Dialect, indexing: Indexing) -> (String, Tables) {
+    shader_with(program, target, indexing, None)
 }
 
 /// The compute shader of a program, which lacks a part: what it draws is wrong, and its time shows what the part costs.
+#[cfg(feature = "report")]
 pub(crate) fn shader_without(program: &Program, target: Dialect, part: Option<Part>) -> (String, Tables) {
+    shader_with(program, target, Indexing::Range, part)
+}
+
+fn shader_with(
+    program: &Program,
+    target: Dialect,
+    indexing: Indexing,
+    part: Option<Part>,
+) -> (String, Tables) {
     let changed = (part == Some(Part::Reconstruction)).then(|| one_gain_each(program));
     let program = changed.as_ref().unwrap_or(program);
     let tables = Tables::new(program);
     let draws = draws_per_thread(program, target);
     let sliced = is_sliced(program, target);
-    let holds = |word: &str| (word == "sliced") == sliced;
-    let mut parts = vec![functions(program, &tables, target, sliced, part), kept(PARAMETERS, holds)];
+    let holds = |word: &str| match word {
+        "sliced" => sliced,
+        "whole" => !sliced,
+        "ranged" => indexing == Indexing::Range,
+        "listed" => indexing == Indexing::List,
+        other => unreachable!("a fragment has a line for shaders that are {other:?}"),
+    };
+    let mut parts = vec![
+        functions(program, &tables, target, sliced, part),
+        kept(PARAMETERS, holds).replace("INDICES_AT", &INDICES_AT.to_string()),
+    ];
     if sliced {
         parts.push(SLICES.replace("PROGRESS_AT", &PROGRESS_AT.to_string()));
     }

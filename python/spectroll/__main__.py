@@ -1,0 +1,5 @@
+"""The program: `python -m spectroll` is `spectroll`."""
+
+from ._spectroll import main
+
+main()

@@ -1,0 +1,498 @@
+"""Samplers: which draws of a model are wanted, and the making of them."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _spectroll
+from ._layout import Arrays
+from ._model import Model
+from ._values import (
+    COLOURS,
+    choice,
+    indices_of,
+    len_of,
+    quantities_of,
+    range_of,
+    seed_of,
+    seed_of_rng,
+    stream_of,
+    whole,
+)
+
+if TYPE_CHECKING:
+    import dask.array
+    import xarray
+
+Quantities = str | Sequence[str] | None
+Drawn = Any
+"""An array, or a mapping of arrays by quantity where a list of quantities was asked for."""
+
+DTYPES = ("float32", "float16")
+LAYOUTS = ("rows", "padded-rows", "planes")
+ILLUMINANTS = ("d65", "a", "e")
+
+
+class Sampler:
+    """Draws of a model with given settings.
+
+    Parameters
+    ----------
+    model : Model, str or path
+        What is drawn from: a model, the name of a built-in one, or a model file.
+    lrv : float, or (low, high), optional
+        Scales each reflectance to this luminous reflectance value (CIE Y of the 1931 2 degree observer under D65, a perfect
+        white being 1), or to one of its own, uniform between two.
+    xyz : (X, Y, Z), optional
+        Gives each reflectance these tristimulus values under D65, where a perfect white has Y = 1.
+    bounds : "base", "scaled" or "both" ("base")
+        The spectrum that must be above 0 and below 1 where there is an `lrv`: before scaling, after it, or both. With
+        "base", as in the paper, scaled values can exceed 1.
+    covariance_scale : float (1)
+        Factor of the weights' covariance.
+    intensity : float, (low, high) or "data", optional
+        Factor of illuminants: one, uniform in the logarithm between two, or those of the measured spectra.
+    illuminant : "D65", "A", "E", or powers, (bands,) ("D65")
+        What reflectances have their XYZ, chromaticity and linear sRGB under.
+    xyz_scale : "absolute" or "unit-y" ("absolute")
+        Scale of the XYZ and linear sRGB of illuminants: sums of power x colour matching function x step in nm, or Y = 1.
+    proposal : "auto", "plain" or "cover" ("auto")
+        Where candidates come from; "cover" finds spectra that plain rejection would hardly ever find.
+    max_attempts : int (65000)
+        The most candidates of a draw.
+    dtype : "float32" or "float16" ("float32")
+        Type of the spectra. Other quantities are float32, and attempts uint32.
+    layout : "rows", "padded-rows" or "planes" ("rows")
+        Order in memory: draw by draw; with room for a multiple of 4 values a draw; or wavelength by wavelength, so that
+        the transpose is contiguous. The shape of arrays and their values are the same.
+    engine : "auto", "cpu", "gpu", or part of an adapter's name or its index ("auto")
+        "auto" is a hardware adapter where there is one, and else the CPU.
+    threads : int, optional
+        Threads of the CPU engine, one per core unless given. With 1, draws are made on the thread that calls.
+
+    Draw i depends on the model, these settings but the last two, the seed, the stream and i, and on nothing else.
+
+    Samplers are immutable, can be pickled, and may be used by several threads, and after a fork or in spawned processes:
+    each process opens an engine of its own.
+    """
+
+    __slots__ = ("_dtype", "_engine", "_layout", "_model", "_natives", "_settings", "_threads")
+
+    _model: Model
+    _settings: dict[str, Any]
+    _dtype: str
+    _layout: str
+    _engine: str
+    _threads: int | None
+    _natives: dict[tuple[str, ...], tuple[_spectroll.Sampler, Arrays]]
+
+    def __init__(
+        self,
+        model: Model | str | os.PathLike[str] = "munsell-vrhel",
+        *,
+        lrv: float | tuple[float, float] | None = None,
+        xyz: Sequence[float] | None = None,
+        bounds: str = "base",
+        covariance_scale: float = 1.0,
+        intensity: float | tuple[float, float] | str | None = None,
+        illuminant: str | ArrayLike = "D65",
+        xyz_scale: str = "absolute",
+        proposal: str = "auto",
+        max_attempts: int = 65_000,
+        dtype: Any = "float32",
+        layout: str = "rows",
+        engine: str | int = "auto",
+        threads: int | None = None,
+    ) -> None:
+        settings = {
+            "lrv": _lrv(lrv),
+            "xyz": None if xyz is None else [float(value) for value in xyz],
+            "bounds": choice("bounds", bounds, ("base", "scaled", "both")),
+            "cov_scale": float(covariance_scale),
+            "intensity": _intensity(intensity),
+            "illuminant": _illuminant(illuminant),
+            "xyz_scale": choice("xyz_scale", xyz_scale, ("absolute", "unit-y")),
+            "proposal": choice("proposal", proposal, ("auto", "plain", "cover")),
+            "max_attempts": whole("max_attempts", max_attempts, 0, 2**32 - 1),
+        }
+        if settings["xyz"] is not None and len(settings["xyz"]) != 3:
+            raise ValueError(f"xyz={xyz!r}: it is three values, X, Y and Z")
+        named = str(engine) if isinstance(engine, int) else engine
+        if not isinstance(named, str) or not named:
+            raise TypeError(f'engine={engine!r}: it is "auto", "cpu", "gpu", or part of an adapter\'s name or its index')
+        self._set(
+            model if isinstance(model, Model) else Model(model),
+            settings,
+            choice("dtype", np.dtype(dtype).name, DTYPES),
+            choice("layout", layout, LAYOUTS),
+            named.lower() if named.lower() in ("auto", "cpu", "gpu") else named,
+            None if threads is None else whole("threads", threads, 1, 2**16),
+        )
+        # What cannot be drawn is refused now, and not with the first draw.
+        self._native(("spectra",))
+        if settings["illuminant"] != "d65" or settings["xyz_scale"] != "absolute":
+            self._native(("xyz",))
+
+    def _set(
+        self,
+        model: Model,
+        settings: dict[str, Any],
+        dtype: str,
+        layout: str,
+        engine: str,
+        threads: int | None,
+    ) -> None:
+        for name, value in {
+            "_model": model,
+            "_settings": settings,
+            "_dtype": dtype,
+            "_layout": layout,
+            "_engine": engine,
+            "_threads": threads,
+            "_natives": {},
+        }.items():
+            object.__setattr__(self, name, value)
+
+    def _native(self, quantities: tuple[str, ...]) -> tuple[_spectroll.Sampler, Arrays]:
+        """The native sampler of some quantities, and the arrays that it fills. Quantities do not change the draws."""
+        found = self._natives.get(quantities)
+        if found is None:
+            settings = {**self._settings, "quantities": quantities}
+            if not COLOURS.intersection(quantities):
+                settings.update(illuminant="d65", xyz_scale="absolute")
+            # In 16 bits or not makes a difference where spectra are drawn.
+            dtype = self._dtype if "spectra" in quantities else "float32"
+            text = json.dumps(settings)
+            native = _spectroll.Sampler(
+                self._model._native, text, self._layout, dtype, self._engine, self._threads
+            )
+            found = native, Arrays(native.formats(), self._layout)
+            self._natives[quantities] = found
+        return found
+
+    # Draws
+
+    def sample(self, n: int, *, rng: Any = None, quantities: Quantities = None) -> Drawn:
+        """n random draws.
+
+        Parameters
+        ----------
+        n : int
+        rng : None, int, numpy.random.Generator, or whatever `numpy.random.default_rng` takes
+            Source of the seed (SPEC 7): the same number gives the same draws, a generator gives others each time, and None
+            too.
+        quantities : str, or list of str ("spectra")
+            One name gives an array, a list of names a mapping of arrays: "spectra", "weights", "xyz", "linear_srgb", "lrv",
+            "attempts", "intensity", "chromaticity".
+
+        Returns
+        -------
+        array, (n, bands) float32 for spectra, or a mapping
+            Reflectances are from 0 to 1, powers of illuminants in the model's unit times their intensity.
+
+        Notes
+        -----
+        `draw` and `at` make the draws of given indices, for data sets that can be made again piece by piece.
+        """
+        return self.draw(range(whole("n", n)), seed=seed_of_rng(rng), quantities=quantities)
+
+    def draw(
+        self,
+        indices: range | int,
+        *,
+        seed: int = 0,
+        stream: str | None = None,
+        quantities: Quantities = None,
+        out: Any = None,
+    ) -> Drawn:
+        """The draws of a range of indices: `range(10**12, 10**12 + 1000)`, or n for range(n).
+
+        Parameters
+        ----------
+        indices : range or int
+            From 0 to 2**64 - 1.
+        seed : int (0)
+            From 0 to 2**64 - 1; the program's --seed.
+        stream : str, optional
+            A name that sets draws apart from others of the same seed; the program's --stream.
+        quantities : str, or list of str ("spectra")
+            See `sample`.
+        out : array, or mapping of arrays, optional
+            Where to put the draws: C-contiguous, of the shape and type that would be returned. The CPU writes whole words
+            of 4 bytes there without a copy, and a GPU copies once.
+
+        Returns
+        -------
+        array, (len(indices), bands), or a mapping; `out` where it is given
+        """
+        asked = range_of(indices)
+        if asked.step != 1 and len_of(asked) > 1:
+            ids = np.arange(len_of(asked), dtype=np.uint64) * np.uint64(asked.step % 2**64) + np.uint64(asked.start)
+            return self.at(ids, seed=seed, stream=stream, quantities=quantities, out=out)
+        count, first = len_of(asked), asked.start if len_of(asked) else 0
+        native, arrays = self._native(quantities_of(quantities)[0])
+        key = (seed_of(seed), stream_of(stream))
+        return self._filled(
+            arrays, (count,), quantities, out, lambda buffers: native.fill(first, count, key, buffers)
+        )
+
+    def at(
+        self,
+        ids: ArrayLike,
+        *,
+        seed: int = 0,
+        stream: str | None = None,
+        quantities: Quantities = None,
+        out: Any = None,
+    ) -> Drawn:
+        """The draws of any indices, in their order: for shuffled loaders and for engines that hand out ids.
+
+        `at(ids)[j]` is `draw(range(ids[j], ids[j] + 1))[0]`, to the last bit.
+
+        Parameters
+        ----------
+        ids : array of whole numbers, of any shape
+            From 0 to 2**64 - 1, any number of times.
+        seed, stream, quantities, out
+            See `draw`.
+
+        Returns
+        -------
+        array, ids.shape + (bands,), or a mapping; `out` where it is given
+        """
+        shaped = indices_of(ids)
+        flat = np.ascontiguousarray(shaped).reshape(-1)
+        native, arrays = self._native(quantities_of(quantities)[0])
+        key = (seed_of(seed), stream_of(stream))
+        return self._filled(
+            arrays, shaped.shape, quantities, out, lambda buffers: native.fill_at(flat, key, buffers)
+        )
+
+    def _filled(self, arrays: Arrays, shape: tuple[int, ...], quantities: Quantities, out: Any, fill: Any) -> Drawn:
+        names, single = quantities_of(quantities)
+        given: Mapping[str, Any] | None = out
+        if out is not None and single:
+            given = {names[0]: out}
+        buffers, found = arrays.empty(shape) if given is None else arrays.given(given, shape, names)
+        fill(buffers)
+        if out is not None:
+            return out
+        return found[names[0]] if single else {name: found[name] for name in names}
+
+    # Properties
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self._model
+
+    @property
+    def wavelengths(self) -> NDArray[np.float64]:
+        """The wavelengths in nm: (bands,) float64."""
+        return self._model.wavelengths
+
+    @property
+    def acceptance(self) -> float:
+        """The share of candidates that are accepted, from 0 to 1, estimated from 65,536 of them."""
+        return self._native(("spectra",))[0].acceptance
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings, as data sets record them."""
+        settings: dict[str, Any] = json.loads(json.dumps(self._settings))
+        return settings
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of the spectra."""
+        return np.dtype(self._dtype)
+
+    @property
+    def engine(self) -> str:
+        """What draws: "CPU (8 threads)", or the adapter with its driver. This opens it."""
+        return self._native(("spectra",))[0].engine()
+
+    @property
+    def threads(self) -> int | None:
+        """Threads of the CPU engine; None is one per core."""
+        return self._threads
+
+    def with_threads(self, threads: int | None) -> Sampler:
+        """The sampler with this number of threads. Its draws are the same."""
+        sampler = Sampler.__new__(Sampler)
+        threads = None if threads is None else whole("threads", threads, 1, 2**16)
+        sampler._set(self._model, self._settings, self._dtype, self._layout, self._engine, threads)
+        return sampler
+
+    def wgsl(self, prefix: str = "draw", *, quantities: Quantities = None) -> str:
+        """The draws as functions of WGSL, for shaders of any engine; every name begins with `prefix` and "_". See
+        `spectroll shader --help` and docs/embedding.md for the functions."""
+        return self._native(quantities_of(quantities)[0])[0].wgsl(prefix)
+
+    # Other libraries
+
+    def to_xarray(
+        self,
+        indices: range | int,
+        *,
+        seed: int = 0,
+        stream: str | None = None,
+        quantities: Quantities = None,
+    ) -> xarray.DataArray | xarray.Dataset:
+        """Draws as an `xarray.DataArray` of (draw, wavelength), with the indices and the wavelengths in nm as coordinates; a
+        `Dataset` where a list of quantities is asked for. Arguments are those of `draw`."""
+        from ._xarray import of_draws
+
+        return of_draws(self, range_of(indices), seed, stream, quantities)
+
+    def to_colour(self, indices: range | int, *, seed: int = 0, stream: str | None = None) -> Any:
+        """Spectra as `colour.MultiSpectralDistributions`, labelled by their indices, for colour-science. Arguments are those
+        of `draw`."""
+        from ._colour import of_draws
+
+        return of_draws(self, range_of(indices), seed, stream)
+
+    def dask(
+        self,
+        n: int | range,
+        *,
+        seed: int = 0,
+        stream: str | None = None,
+        quantities: str = "spectra",
+        chunks: int = 2**20,
+    ) -> dask.array.Array:
+        """Draws as a lazy `dask.array` of (n, bands), in blocks of `chunks` draws. Each task draws on one thread, that which
+        runs it, and any block is the same wherever it is made. `spectroll.dask.write` writes it."""
+        from .dask import array
+
+        return array(self, n, seed=seed, stream=stream, quantities=quantities, chunks=chunks)
+
+    def torch(
+        self,
+        n: int | range,
+        *,
+        seed: int = 0,
+        stream: str | None = None,
+        quantities: Quantities = None,
+        batch_size: int | None = None,
+    ) -> Any:
+        """Draws as a data set for `torch.utils.data.DataLoader`.
+
+        Without `batch_size` it is map-style, with `__getitems__` for whole batches, so that any sampler and shuffling works.
+        With it, it is iterable and yields batches; workers and the ranks of `torch.distributed` take turns, so that all
+        together see each draw once.
+        """
+        from .torch import dataset
+
+        return dataset(self, n, seed=seed, stream=stream, quantities=quantities, batch_size=batch_size)
+
+    # Python
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a sampler is immutable: {name} cannot be set; make another")
+
+    def __reduce__(self) -> Any:
+        state = (self._settings, self._dtype, self._layout, self._engine, self._threads)
+        return _restored, (self._model, *state)
+
+    def _key(self) -> tuple[Any, ...]:
+        return (json.dumps(self._settings), self._dtype, self._layout, self._engine, self._threads)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sampler) and self._key() == other._key() and self._model == other._model
+
+    def __hash__(self) -> int:
+        return hash((self._key(), self._model))
+
+    def __repr__(self) -> str:
+        default = {"bounds": "base", "cov_scale": 1.0, "illuminant": "d65", "xyz_scale": "absolute"}
+        default |= {"proposal": "auto", "max_attempts": 65_000, "dtype": "float32", "layout": "rows"}
+        default |= {"engine": "auto"}
+        shown = {**self._settings, "dtype": self._dtype, "layout": self._layout}
+        shown |= {"engine": self._engine, "threads": self._threads}
+        changed = {k: v for k, v in shown.items() if v is not None and v != default.get(k)}
+        words = ", ".join(f"{name}={_shown(value)}" for name, value in changed.items())
+        model = repr(self._model.name) if self._model.name else repr(self._model)
+        return f"<Sampler {model}{', ' if words else ''}{words}: {100 * self.acceptance:.2f} % accepted>"
+
+    def _repr_svg_(self) -> str:
+        from ._picture import of_sampler
+
+        return of_sampler(self)
+
+    def _repr_html_(self) -> str:
+        from ._picture import page
+
+        rows = [(name, _shown(value)) for name, value in self._settings.items() if value is not None]
+        rows.append(("accepted", f"{100 * self.acceptance:.2f} %"))
+        return page(repr(self)[1:-1], self._repr_svg_(), rows)
+
+
+def _restored(
+    model: Model, settings: dict[str, Any], dtype: str, layout: str, engine: str, threads: int | None
+) -> Sampler:
+    sampler = Sampler.__new__(Sampler)
+    sampler._set(model, settings, dtype, layout, engine, threads)
+    return sampler
+
+
+def _shown(value: Any) -> str:
+    """A setting as it was given."""
+    match value:
+        case {"uniform": [low, high]} | {"loguniform": [low, high]}:
+            return f"({low:g}, {high:g})"
+        case {"fixed": number}:
+            return f"{number:g}"
+        case {"power": _}:
+            return "(powers)"
+        case _:
+            return f"{value}" if not isinstance(value, str) else repr(value)
+
+
+def _pair(name: str, value: Any) -> list[float] | None:
+    """Two numbers, where there are two."""
+    if np.ndim(value) == 0:
+        return None
+    pair = [float(each) for each in value]
+    if len(pair) != 2:
+        raise ValueError(f"{name}={value!r}: it is one number, or two between which it lies")
+    return pair
+
+
+def _finite(name: str, *numbers: float) -> None:
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"{name}={numbers[0] if len(numbers) == 1 else numbers}: numbers are finite")
+
+
+def _lrv(lrv: Any) -> Any:
+    if lrv is None:
+        return None
+    pair = _pair("lrv", lrv)
+    _finite("lrv", *(pair or [float(lrv)]))
+    return {"uniform": pair} if pair else float(lrv)
+
+
+def _intensity(intensity: Any) -> Any:
+    if intensity is None:
+        return None
+    if isinstance(intensity, str):
+        return choice("intensity", intensity, ("data",))
+    pair = _pair("intensity", intensity)
+    _finite("intensity", *(pair or [float(intensity)]))
+    return {"loguniform": pair} if pair else {"fixed": float(intensity)}
+
+
+def _illuminant(illuminant: Any) -> Any:
+    if isinstance(illuminant, str):
+        return choice("illuminant", illuminant, ILLUMINANTS)
+    powers = np.asarray(illuminant, np.float64)
+    if powers.ndim != 1:
+        raise ValueError(f"an illuminant of shape {powers.shape}: it is a power for each wavelength")
+    _finite("illuminant", *powers)
+    return {"power": powers.tolist()}

@@ -1,0 +1,114 @@
+"""Scenes of lights, surfaces and targets."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _spectroll
+from ._values import whole
+
+
+class SceneArray(NamedTuple):
+    """An array of a scene."""
+
+    name: str
+    group: str
+    quantity: str
+    shape: tuple[int, ...]
+    """Shape of an entry: (elements, bands) for spectra."""
+    per_scene: bool
+    """Whether there is an entry for each scene, and not one for all."""
+
+
+class Scene:
+    """Scenes of a TOML file, or of an example: "condition1", "condition2" or "condition3".
+
+    Parameters
+    ----------
+    name : str or path
+    seed : int, optional
+        Takes the place of the file's.
+    engine, threads
+        Those of `Sampler`.
+
+    `scenes(0, 100)` draws a hundred scenes. Scenes are immutable and can be pickled, and may be used after a fork.
+    """
+
+    __slots__ = ("_arguments", "_native", "_wavelengths")
+
+    def __init__(
+        self,
+        name: str | os.PathLike[str],
+        *,
+        seed: int | None = None,
+        engine: str | int = "auto",
+        threads: int | None = None,
+    ) -> None:
+        path = os.fspath(name)
+        seed = None if seed is None else whole("seed", seed)
+        threads = None if threads is None else whole("threads", threads, 1, 2**16)
+        if os.path.exists(path):
+            path = os.path.abspath(path)  # what is pickled may be opened from another folder
+        self._arguments = (path, seed, str(engine), threads)
+        self._native = _spectroll.Scene(*self._arguments)
+        self._wavelengths = self._native.wavelengths
+        self._wavelengths.flags.writeable = False
+
+    def scenes(self, start: int = 0, stop: int | None = None) -> dict[str, NDArray[Any]]:
+        """Scenes start to stop - 1: a mapping of arrays by name, (scenes, elements, bands) float32 for spectra. What all
+        scenes share has no axis of scenes, as `arrays` tells. One number is a stop, as in `range`."""
+        if stop is None:
+            start, stop = 0, start or len(self)
+        asked = self._range(range(whole("start", start), whole("stop", stop)))
+        drawn = self._native.draw(asked.start, asked.stop)
+        return {name: data.view(dtype).reshape(shape) for name, shape, dtype, data, _ in drawn}
+
+    def _range(self, scenes: range | int) -> range:
+        asked = scenes if isinstance(scenes, range) else range(whole("n", scenes))
+        if asked.step != 1 or not 0 <= asked.start <= asked.stop <= len(self):
+            raise ValueError(f"scenes {asked.start} to {asked.stop}: there are {len(self)}, from 0 on")
+        return asked
+
+    @property
+    def arrays(self) -> list[SceneArray]:
+        """What each scene has."""
+        all = self._native.arrays()
+        return [SceneArray(name, group, quantity, tuple(shape), each) for name, group, quantity, shape, each in all]
+
+    @property
+    def groups(self) -> list[str]:
+        """The names of the groups."""
+        return self._native.groups
+
+    @property
+    def seed(self) -> int:
+        """The seed."""
+        return self._native.seed
+
+    @property
+    def wavelengths(self) -> NDArray[np.float64]:
+        """The wavelengths in nm: (bands,) float64."""
+        return self._wavelengths
+
+    @property
+    def text(self) -> str:
+        """The text of the scene file."""
+        return self._native.text
+
+    def __len__(self) -> int:
+        return self._native.count
+
+    def __reduce__(self) -> Any:
+        return _restored, self._arguments
+
+    def __repr__(self) -> str:
+        groups = ", ".join(self.groups)
+        return f"<Scene {os.path.basename(self._arguments[0])!r}: {len(self)} scenes of {groups}; seed {self.seed}>"
+
+
+def _restored(path: str, seed: int | None, engine: str, threads: int | None) -> Scene:
+    return Scene(path, seed=seed, engine=engine, threads=threads)

@@ -1,0 +1,214 @@
+"""Draws: the bytes of the program's, whatever the quantity, layout and engine, of ranges and of lists of indices."""
+
+import numpy as np
+import pytest
+
+import spectroll
+from spectroll import Sampler
+
+ALL = ["spectra", "weights", "xyz", "linear_srgb", "lrv", "attempts", "chromaticity"]
+LIGHTS = ["spectra", "weights", "xyz", "linear_srgb", "attempts", "intensity", "chromaticity"]
+
+# Settings, the program's words for them, and quantities.
+CASES = {
+    "plain": ("munsell-vrhel", {}, [], ALL),
+    "target": ("munsell-vrhel", {"lrv": 0.4, "bounds": "both"}, ["--lrv", 0.4, "--bounds", "both"], ALL),
+    "targets": (
+        "munsell-vrhel-5nm",
+        {"lrv": (0.2, 0.6), "bounds": "scaled", "illuminant": "A"},
+        ["--lrv", "0.2..0.6", "--bounds", "scaled", "--illuminant", "a"],
+        ALL,
+    ),
+    "cover": ("munsell-vrhel", {"lrv": 0.98, "bounds": "scaled"}, ["--lrv", 0.98, "--bounds", "scaled"], ALL),
+    "base": ("munsell-vrhel", {"lrv": 0.6}, ["--lrv", 0.6], ALL),
+    "lights": (
+        "granada",
+        {"intensity": (0.15, 150), "covariance_scale": 4, "xyz_scale": "unit-y"},
+        ["--intensity", "0.15..150", "--cov-scale", 4, "--xyz-scale", "unit-y"],
+        LIGHTS,
+    ),
+    "data": ("granada-5nm", {"intensity": "data", "max_attempts": 99}, ["--intensity", "data", "--max-attempts", 99], LIGHTS),
+}
+SOME = range(2**32 - 350, 2**32 + 351)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_draws_are_those_of_the_program(case, engine, program, tmp_path):
+    model, settings, words, quantities = CASES[case]
+    program(
+        "sample", model, "-n", len(SOME), "--start", SOME.start, "--seed", 2**64 - 3, "--stream", "walls",
+        "--quantities", ",".join(quantities), "--engine", engine, "-o", "draws.npz", *words,
+    )  # fmt: skip
+    made = np.load(tmp_path / "draws.npz")
+    key = {"seed": 2**64 - 3, "stream": "walls"}
+    shuffled = np.random.default_rng(1).permutation(len(SOME))
+    for layout in ["rows", "padded-rows", "planes"]:
+        sampler = Sampler(model, engine=engine, layout=layout, **settings)
+        drawn = sampler.draw(SOME, quantities=quantities, **key)
+        listed = sampler.at(shuffled + SOME.start, quantities=quantities, **key)
+        assert list(drawn) == list(listed) == quantities
+        for name in quantities:
+            expected = made[name]
+            assert drawn[name].dtype == expected.dtype and drawn[name].shape == expected.shape, name
+            assert drawn[name].tobytes() == expected.tobytes(), (name, layout)
+            assert listed[name].tobytes() == expected[shuffled].tobytes(), (name, layout)
+            # One quantity alone is that of the same draws.
+            assert sampler.draw(SOME, quantities=name, **key).tobytes() == expected.tobytes()
+        if layout == "planes":
+            assert drawn["spectra"].T.strides[1] == 4
+        if layout == "padded-rows":
+            assert drawn["spectra"].strides[0] % 16 == 0
+
+
+def test_16_bits_are_those_of_the_program(engine, program, tmp_path):
+    program("sample", "munsell-vrhel", "-n", 501, "--dtype", "f16", "--engine", engine, "-o", "half.npy")
+    expected = np.load(tmp_path / "half.npy")
+    for layout in ["rows", "padded-rows", "planes"]:
+        sampler = Sampler(dtype="float16", layout=layout, engine=engine)
+        assert sampler.draw(501).dtype == expected.dtype
+        assert sampler.draw(501).tobytes() == expected.tobytes()
+        assert sampler.at(np.arange(501)[::-1]).tobytes() == expected[::-1].tobytes()
+
+
+def test_threads_do_not_show():
+    expected = Sampler(engine="cpu").draw(5000).tobytes()
+    for threads in [1, 2, 7]:
+        assert Sampler(engine="cpu", threads=threads).draw(5000).tobytes() == expected
+
+
+def test_many_draws_are_those_of_few_whatever_the_layout():
+    """More than are drawn between two looks for Ctrl-C."""
+    count = 2**19 + 2**18 + 3
+    expected = Sampler(engine="cpu").draw(range(count - 1001, count))
+    for layout in ["rows", "padded-rows", "planes"]:
+        sampler = Sampler(engine="cpu", layout=layout)
+        drawn = sampler.draw(count)
+        assert drawn[-1001:].tobytes() == expected.tobytes(), layout
+        assert drawn[:1000].tobytes() == sampler.draw(1000).tobytes(), layout
+        assert drawn[2**19 - 2 : 2**19 + 2].tobytes() == sampler.draw(range(2**19 - 2, 2**19 + 2)).tobytes()
+
+
+def test_indices_reach_to_the_last(engine):
+    sampler = Sampler(engine=engine)
+    last = 2**64 - 1
+    expected = sampler.draw(range(last - 4, last + 1))
+    assert sampler.at([last, last - 4])[0].tobytes() == expected[4].tobytes()
+    assert sampler.at(np.array([last], np.uint64)).tobytes() == expected[4:].tobytes()
+    assert sampler.draw(range(last, last - 5, -1)).tobytes() == expected[::-1].tobytes()
+    assert sampler.draw(range(last - 4, last + 1, 2)).tobytes() == expected[::2].tobytes()
+    assert len(sampler.draw(range(2**70, 2**70))) == 0
+
+
+def test_shapes_follow_the_indices():
+    sampler = Sampler(engine="cpu")
+    rows = sampler.draw(12)
+    assert sampler.at(5).shape == (31,)
+    assert sampler.at(np.int8(5)).tobytes() == rows[5].tobytes()
+    assert sampler.at(np.arange(12).reshape(3, 4)).tobytes() == rows.tobytes()
+    assert sampler.at(np.arange(12).reshape(3, 4)).shape == (3, 4, 31)
+    assert sampler.at(np.arange(24)[::2]).tobytes() == sampler.draw(range(0, 24, 2)).tobytes()
+    assert sampler.at([], quantities="attempts").shape == (0,)
+    assert sampler.draw(0).shape == (0, 31)
+    assert sampler.at(np.arange(12).reshape(3, 4), quantities="lrv").shape == (3, 4)
+    planes = Sampler(engine="cpu", layout="planes")
+    assert planes.at(np.arange(12).reshape(3, 4)).tobytes() == rows.tobytes()
+
+
+def test_out_is_filled_and_returned(engine):
+    sampler = Sampler(engine=engine)
+    expected = sampler.draw(1000, seed=3)
+    out = np.empty((1000, 31), np.float32)
+    assert sampler.draw(1000, seed=3, out=out) is out
+    assert out.tobytes() == expected.tobytes()
+    assert sampler.at(np.arange(1000), seed=3, out=out[::1]).tobytes() == expected.tobytes()
+    both = {"attempts": np.zeros(1000, np.uint32), "spectra": np.zeros((1000, 31), np.float32)}
+    assert sampler.draw(1000, seed=3, quantities=["spectra", "attempts"], out=both) is both
+    assert both["spectra"].tobytes() == expected.tobytes()
+    assert both["attempts"].tobytes() == sampler.draw(1000, seed=3, quantities="attempts").tobytes()
+    assert both["attempts"].min() >= 1 and both["attempts"].max() < 1000
+    # An array that does not begin on a whole word is filled too.
+    odd = np.zeros(1000 * 31 * 4 + 1, np.uint8)[1:].view(np.float32).reshape(1000, 31)
+    assert sampler.draw(1000, seed=3, out=odd).tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("out", "kind"),
+    [
+        (np.zeros((10, 30), np.float32), ValueError),
+        (np.zeros((10, 31)), ValueError),
+        (np.zeros((10, 31), ">f4"), ValueError),
+        (np.zeros((10, 62), np.float32)[:, ::2], ValueError),
+        (np.broadcast_to(np.float32(0), (10, 31)), ValueError),
+        ([[0.0] * 31] * 10, TypeError),
+    ],
+)
+def test_what_cannot_be_filled_is_refused(out, kind):
+    with pytest.raises(kind, match="out: spectra"):
+        Sampler(engine="cpu").draw(10, out=out)
+
+
+def test_arrays_of_the_callers_are_for_rows():
+    with pytest.raises(ValueError, match='layout="planes"'):
+        Sampler(engine="cpu", layout="planes").draw(10, out=np.zeros((10, 31), np.float32))
+    with pytest.raises(ValueError, match="asked for"):
+        Sampler(engine="cpu").draw(3, quantities=["lrv"], out={"spectra": np.zeros((3, 31), np.float32)})
+
+
+def test_rng_is_that_of_spec_7():
+    sampler = Sampler(engine="cpu")
+    seven = sampler.sample(20, rng=7)
+    assert seven.tobytes() == sampler.sample(20, rng=7).tobytes()
+    assert seven.tobytes() == sampler.sample(20, rng=np.random.default_rng(7)).tobytes()
+    assert seven.tobytes() == sampler.sample(20, rng=np.random.SeedSequence(7)).tobytes()
+    generator = np.random.default_rng(7)
+    assert sampler.sample(20, rng=generator).tobytes() == seven.tobytes()
+    assert sampler.sample(20, rng=generator).tobytes() != seven.tobytes()
+    assert sampler.sample(20).tobytes() != sampler.sample(20).tobytes()
+    seed = int(np.random.default_rng(7).integers(2**64 - 1, dtype=np.uint64, endpoint=True))
+    assert sampler.draw(20, seed=seed).tobytes() == seven.tobytes()
+
+
+def test_seeds_and_streams_set_draws_apart():
+    sampler = Sampler(engine="cpu")
+    draws = [sampler.draw(50, seed=seed, stream=stream) for seed in (0, 1) for stream in (None, "a", "b")]
+    assert len({each.tobytes() for each in draws}) == 6
+
+
+def test_a_tensor_library_takes_the_arrays_as_they_are():
+    spectra = Sampler(engine="cpu").draw(5)
+    shared = np.from_dlpack(spectra)
+    assert np.shares_memory(shared, spectra)
+
+
+def test_spectra_keep_their_bounds_and_targets():
+    sampler = Sampler("munsell-vrhel", lrv=0.4, bounds="both", engine="cpu")
+    drawn = sampler.sample(5000, rng=1, quantities=["spectra", "lrv", "xyz"])
+    assert 0 < drawn["spectra"].min() and drawn["spectra"].max() < 1
+    np.testing.assert_allclose(drawn["lrv"], 0.4, atol=1e-6)
+    np.testing.assert_allclose(drawn["xyz"][:, 1], 0.4, atol=1e-6)
+    xyz = Sampler(xyz=(0.35, 0.3, 0.2), engine="cpu").draw(100, quantities="xyz")
+    np.testing.assert_allclose(xyz, np.tile([0.35, 0.3, 0.2], (100, 1)), atol=1e-6)
+
+
+def test_an_illuminant_may_be_given_as_powers():
+    flat = Sampler(illuminant=np.ones(31), engine="cpu").draw(9, quantities="xyz")
+    equal = Sampler(illuminant="E", engine="cpu").draw(9, quantities="xyz")
+    np.testing.assert_allclose(flat, equal, rtol=1e-6)
+
+
+def test_threads_of_python_draw_at_the_same_time():
+    from concurrent.futures import ThreadPoolExecutor
+
+    for threads in (1, None):
+        sampler = Sampler(engine="cpu", threads=threads)
+        expected = [sampler.draw(2000, seed=seed).tobytes() for seed in range(16)]
+        with ThreadPoolExecutor(8) as pool:
+            found = list(pool.map(lambda seed: sampler.draw(2000, seed=seed).tobytes(), range(16)))
+        assert found == expected
+
+
+def test_the_module_says_what_it_has():
+    assert set(spectroll.__all__) <= set(dir(spectroll))
+    assert all(getattr(spectroll, name) is not None for name in spectroll.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'Smpler'"):
+        spectroll.Smpler  # noqa: B018
