@@ -153,8 +153,8 @@ impl Case {
             blank: r.once_in(5),
             trailing: separator != ' ' && r.once_in(5),
             comment: r.once_in(6),
-            ending: *r.of(&["\n", "\r\n", "\r"]),
-            encoding: *r.of(&["utf8", "utf8", "bom", "utf16le", "utf16be", "latin"]),
+            ending: r.of(&["\n", "\r\n", "\r"]),
+            encoding: r.of(&["utf8", "utf8", "bom", "utf16le", "utf16be", "latin"]),
             digits,
             wavelengths,
             spectra,
@@ -342,7 +342,7 @@ impl Case {
             let (first, last) =
                 self.wavelengths.iter().fold((f64::INFINITY, 0.0f64), |(a, b), &w| (a.min(w), b.max(w)));
             let grid = Grid::new(first, (last - first) / 10.0, 10).expect("a grid");
-            match Dataset::new(&[reading.table.clone()], grid, Extrapolation::Error) {
+            match Dataset::new(std::slice::from_ref(&reading.table), grid, Extrapolation::Error) {
                 Ok(data) => data.judge(SpectrumKind::Reflectance).err().map(|e| e.to_string()),
                 Err(error) => Some(error.to_string()),
             }

@@ -217,7 +217,8 @@ fn read_column(
         let starts: Vec<usize> = (0..reps.len()).filter(|i| reps[*i] == 0).collect();
         let width = starts.get(1).copied().unwrap_or(all.len());
         let is_even = starts.iter().enumerate().all(|(row, start)| *start == row * width);
-        if !is_even || all.len() % width != 0 || column.width.is_some_and(|before| before != width) {
+        if !is_even || !all.len().is_multiple_of(width) || column.width.is_some_and(|before| before != width)
+        {
             return Err(format!("the lists of {:?} are not of one length", column.name));
         }
         column.width = Some(width);

@@ -144,7 +144,7 @@ impl Family {
             grid: grid.clone(),
         })?;
         let fit = Fit::new(self.kind).fit(&data);
-        fit.map_err(|source| ModelError::BuiltinFit { name: name(), grid, source })
+        fit.map_err(|source| ModelError::BuiltinFit { name: name(), grid, source: Box::new(source) })
     }
 
     fn tables(&self) -> Vec<Table> {

@@ -125,7 +125,7 @@ pub enum ModelError {
     )]
     BuiltinRange { name: String, first: f64, last: f64, grid: Grid },
     #[error("{name} cannot be fitted at {grid} nm, choose a grid of more bands or a wider one: {source}")]
-    BuiltinFit { name: String, grid: Grid, source: FitError },
+    BuiltinFit { name: String, grid: Grid, source: Box<FitError> },
 }
 
 impl Model {
