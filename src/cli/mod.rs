@@ -1,6 +1,8 @@
 //! The command line: a module a command. Each takes its arguments and returns an error, which is printed here, once,
 //! with the exit code that its kind has.
 
+#![allow(rustdoc::invalid_html_tags)] // what documents the commands is their help, as it stands
+
 /// Prints a line on standard error. Unlike `eprintln` it does not panic where nobody can read that: what was done is
 /// done.
 macro_rules! tell {

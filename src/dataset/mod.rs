@@ -117,8 +117,8 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Judges `tables`, resamples them onto `grid` and joins them, in order, as [`Resampling`] says; an [`Extrapolation`]
-    /// alone stands for settings that are otherwise the defaults. Values that no measurement gives are an error.
+    /// Judges `tables`, resamples them onto `grid` and joins them, in order, as [`Resampling`] says; an
+    /// [`Extrapolation`](crate::Extrapolation) alone stands for settings that are otherwise the defaults. Values that no measurement gives are an error.
     pub fn new(
         tables: &[Table],
         grid: Grid,
