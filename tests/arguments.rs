@@ -70,7 +70,7 @@ fn a_model_whose_mean_is_negative_is_drawn_with_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let rows = (0..5).map(|i| format!("{},{},{},{}\n", 400 + 10 * i, 1 + i % 3, 2, 5 - i % 4));
-    fs::write(folder.join("lamps.csv"), rows.collect::<String>()).unwrap();
+    fs::write(folder.join("lamps.csv"), format!("nm,a,b,c\n{}", rows.collect::<String>())).unwrap();
     succeeds(folder, "fit lamps.csv --kind illuminant -k 2 --wavelengths 400:10:440 -o fine.json");
     let text = fs::read_to_string(folder.join("fine.json")).unwrap();
     let mut model: serde_json::Value = serde_json::from_str(&text).unwrap();

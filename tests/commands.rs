@@ -94,6 +94,11 @@ fn blocks(text: &str) -> Result<Vec<Block<'_>>, String> {
     }
 }
 
+/// Whether a line of Python imports the package of this project.
+fn imports_the_package(line: &str) -> bool {
+    (line.starts_with("import ") || line.starts_with("from ")) && line.contains("spectroll")
+}
+
 /// The steps of a document, each with its line.
 fn steps(text: &str) -> Result<Vec<(usize, Step)>, String> {
     let mut steps = Vec::new();
@@ -107,7 +112,7 @@ fn steps(text: &str) -> Result<Vec<(usize, Step)>, String> {
                     name.ok_or(format!("{line}: the first line must name the file, as in `# a.{language}`"))?;
                 steps.push((line, Step::Write { name: name.to_owned(), text: text.clone() }));
             }
-            "python" if text.contains("import spectroll") => {}
+            "python" if text.lines().any(imports_the_package) => {}
             "python" => steps.push((line, Step::Python(text))),
             "rust" | "wgsl" | "text" => {}
             other => return Err(format!("{line}: a block of {other:?} is not known here")),
@@ -137,7 +142,8 @@ fn commands(first: usize, text: &str) -> Result<Vec<(usize, Step)>, String> {
 fn command_of(line: &str) -> Result<Option<Step>, String> {
     let words = line.split_whitespace().take_while(|word| !word.starts_with('#'));
     let mut words: Vec<String> = words.map(str::to_owned).collect();
-    if words.is_empty() {
+    // What pip installs is tested with the wheel, by `scripts/wheel.sh`.
+    if words.is_empty() || words[0] == "pip" {
         return Ok(None);
     }
     let output = match words.iter().position(|word| word == ">") {

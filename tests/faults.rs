@@ -13,6 +13,7 @@ use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 
 use program::{PROGRAM, tree};
+use rayon::prelude::*;
 
 /// The kinds of call, with an error that each may have.
 const FAULTS: [&str; 20] = [
@@ -115,38 +116,47 @@ fn verdict(folder: &Path, output: &Output, whole: &[(String, Vec<u8>)]) -> Optio
 
 /// Lets the calls of some kinds fail in some runs: those of the numbers that `at` picks of the count of such calls, each
 /// alone or with all that follow it.
-fn try_all(runs: &[&str], at: impl Fn(u64) -> Vec<(u64, bool)>) -> (usize, Vec<String>) {
+fn try_all(runs: &[&str], at: impl Fn(u64) -> Vec<(u64, bool)> + Sync) -> (usize, Vec<String>) {
+    // Much of the time is spent on waiting for the disk.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build().unwrap();
+    let results: Vec<_> = pool.install(|| runs.par_iter().map(|run| try_run(run, &at)).collect());
+    let tried = results.iter().map(|(tried, _)| tried).sum();
+    (tried, results.into_iter().flat_map(|(_, wrong)| wrong).collect())
+}
+
+/// As [`try_all`], in one run.
+fn try_run(arguments: &str, at: &impl Fn(u64) -> Vec<(u64, bool)>) -> (usize, Vec<String>) {
     let (mut tried, mut wrong) = (0, Vec::new());
-    for arguments in runs {
-        let root = tempfile::tempdir().unwrap();
-        let make = |name: &str| {
-            let folder = root.path().join(name);
-            fs::create_dir(&folder).unwrap();
-            folder
-        };
-        let folder = make("whole");
-        let output = run(&folder, arguments, "none:EIO", 1, false);
-        assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
-        let whole = tree(&folder);
-        for fault in FAULTS {
-            let folder = make("count");
-            run(&folder, arguments, fault, u64::MAX >> 1, false);
-            let count: u64 = fs::read_to_string(folder.with_extension("count")).unwrap().parse().unwrap();
+    let root = tempfile::tempdir().unwrap();
+    let make = |name: &str| {
+        let folder = root.path().join(name);
+        fs::create_dir(&folder).unwrap();
+        folder
+    };
+    let folder = make("whole");
+    let output = run(&folder, arguments, "none:EIO", 1, false);
+    assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
+    let whole = tree(&folder);
+    for fault in FAULTS {
+        let folder = make("count");
+        run(&folder, arguments, fault, u64::MAX >> 1, false);
+        let count: u64 = fs::read_to_string(folder.with_extension("count")).unwrap().parse().unwrap();
+        fs::remove_dir_all(&folder).unwrap();
+        let mut numbers = at(count);
+        // Whoever is interrupted tries again, which would never end if that happened each time.
+        let ends = |always: bool| !(always && fault == "write:EINTR");
+        numbers.retain(|&(number, always)| (1..=count).contains(&number) && ends(always));
+        numbers.dedup();
+        for (number, always) in numbers {
+            let folder = make("fault");
+            let output = run(&folder, arguments, fault, number, always);
+            tried += 1;
+            let place = || {
+                let more = if always { " and all after it" } else { "" };
+                format!("{arguments}: {fault} at {number} of {count}{more}")
+            };
+            wrong.extend(verdict(&folder, &output, &whole).map(|what| format!("{}: {what}", place())));
             fs::remove_dir_all(&folder).unwrap();
-            let mut numbers = at(count);
-            numbers.retain(|(number, _)| (1..=count).contains(number));
-            numbers.dedup();
-            for (number, always) in numbers {
-                let folder = make("fault");
-                let output = run(&folder, arguments, fault, number, always);
-                tried += 1;
-                let place = || {
-                    let more = if always { " and all after it" } else { "" };
-                    format!("{arguments}: {fault} at {number} of {count}{more}")
-                };
-                wrong.extend(verdict(&folder, &output, &whole).map(|what| format!("{}: {what}", place())));
-                fs::remove_dir_all(&folder).unwrap();
-            }
         }
     }
     (tried, wrong)

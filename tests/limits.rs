@@ -16,7 +16,7 @@ fn a_set_has_no_more_chunks_than_its_manifest_can_list() {
     for format in ["x.zarr", "x/ --format npy"] {
         let sample =
             |rest: &str| format!("sample munsell-vrhel --engine cpu --force-space -o {format} {rest}");
-        fails(folder, &sample("-n 4e15"), 2, "chunks of");
+        fails(folder, &sample("-n 4e15"), 2, "chunks, and a set has at most a million");
         fails(folder, &sample("-n 1e9 --chunk 1"), 2, "1000000000 chunks, and a set has at most a million");
         fails(folder, &sample("-n 1e9 --chunk 1e9"), 2, "let a chunk have at most 8659208 (--chunk)");
         fails(folder, &sample("-n 1e9 --chunk 18446744073709551615"), 2, "four are in memory at once");

@@ -100,7 +100,9 @@ pub enum OutputError {
          delete: choose another format, or write it anyway"
     )]
     ManyFiles { path: PathBuf, count: u64 },
-    #[error("{path:?} would be a set of {chunks} chunks, and a set has at most a million: make them larger")]
+    #[error(
+        "{path:?} would be a set of {chunks} chunks, and a set has at most a million: make them larger, or several sets"
+    )]
     ManyChunks { path: PathBuf, chunks: u64 },
     #[error(
         "{path:?} would have chunks of {rows} draws, {bytes} each, of which four are in memory at once: let a chunk have \

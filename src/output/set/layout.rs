@@ -47,11 +47,12 @@ impl Part<'_> {
 
 impl ChunkFormat {
     /// Default number of draws per chunk, for rows of `row_bytes` and `count` draws in all: a power of two of about 16
-    /// MiB, or what makes no more than a million chunks, or all.
+    /// MiB, or what makes no more than a million chunks if those have no more than 1 GiB, or all.
     pub fn default_chunk(row_bytes: u64, count: u64) -> u64 {
         let usual = 1 << (CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2();
         let least = count.div_ceil(MOST_CHUNKS).checked_next_power_of_two().unwrap_or(count);
-        least.max(usual).min(count.max(1))
+        let most = 1 << (MOST_CHUNK_BYTES / row_bytes.max(1)).max(1).ilog2();
+        least.max(usual).min(most).min(count.max(1))
     }
 
     /// Encodes the files of a chunk.
@@ -124,12 +125,12 @@ mod tests {
 
     #[test]
     fn a_chunk_is_a_power_of_two_of_draws_or_all() {
-        assert_eq!(ChunkFormat::default_chunk(124, 1 << 40), 1 << 17);
+        assert_eq!(ChunkFormat::default_chunk(124, 1 << 36), 1 << 17);
         assert_eq!(ChunkFormat::default_chunk(1 << 40, 10), 1);
         assert_eq!(ChunkFormat::default_chunk(124, 10), 10);
         assert_eq!(ChunkFormat::default_chunk(124, 0), 1);
         // 2 x 10^12 draws of 124 bytes, of which 16 MiB would be 15 million chunks.
         assert_eq!(ChunkFormat::default_chunk(124, 2_000_000_000_000), 1 << 21);
-        assert_eq!(ChunkFormat::default_chunk(124, u64::MAX), 1 << 45);
+        assert_eq!(ChunkFormat::default_chunk(124, u64::MAX), 1 << 23);
     }
 }

@@ -106,7 +106,13 @@ enum Step {
 
 fn step(path: &Path, root: &Path, depth: Depth, own: Option<&str>) -> Result<Step, OutputError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
-    let manifest = whole(path, root)?;
+    let manifest = match whole(path, root) {
+        // It had one as this process wrote it.
+        Err(OutputError::NotASet { .. }) if own.is_some() => {
+            return Err(OutputError::Replaced { root: root.to_owned() });
+        }
+        manifest => manifest?,
+    };
     let waiting = SetStatus::Waiting { done: manifest.chunks.len() as u64, chunks: manifest.plan.chunks() };
     if own.is_some() && manifest.generation.is_some() && manifest.generation.as_deref() != own {
         return Err(OutputError::Replaced { root: root.to_owned() });
