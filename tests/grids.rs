@@ -258,7 +258,7 @@ fn pictures_shaders_and_scenes_take_uneven_wavelengths() {
     let head = fs::read_to_string(folder.join("g.csv")).unwrap();
     assert!(head.starts_with("443,490,560,665,705,740,783,842,865\n"), "{head}");
     let scene = "scenes = 2\nwavelengths = [410, 443, 470, 490, 530, 560, 620, 665, 700]\n\
-                 [[illuminant]]\nname = \"sun\"\nmodel = \"granada\"\n\
+                 [[illuminant]]\nname = \"sun\"\nmodel = \"granada\"\ncount = 1\n\
                  [[surface]]\nname = \"wall\"\nmodel = \"munsell-vrhel\"\ncount = 2\n";
     fs::write(folder.join("bands.toml"), scene).unwrap();
     let (_, said) = succeeds(folder, "scene bands.toml --engine cpu -o bands.npz");

@@ -50,7 +50,7 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
     write("broken.json", "{ \"schema\": 1 ");
     let fine = Model::builtin("munsell-vrhel-5nm").expect("it is built in");
     write("fine.json", &fine.to_json());
-    write("two.csv", "380,1,2\n540,1,2\n780,1,2\n");
+    write("two.csv", "nm,a,b\n380,1,2\n540,1,2\n780,1,2\n");
     write("short.csv", "500,1\n540,2\n600,3\n");
     let dips =
         (40..=70).map(|ten| format!("{ten}0,{}\n", if ten == 50 { -1 } else { 2 })).collect::<String>();

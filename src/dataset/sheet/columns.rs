@@ -55,7 +55,7 @@ impl Column {
     }
 
     fn at(sheet: &Sheet, extent: Extent, column: usize, options: &ReadOptions) -> Column {
-        let rows: Vec<usize> = (0..sheet.rows.len())
+        let mut rows: Vec<usize> = (0..sheet.rows.len())
             .filter(|&row| {
                 !sheet.row(row).is_comment && extent.fits(sheet, row) && !sheet.value(row, column).is_nan()
             })
@@ -67,7 +67,15 @@ impl Column {
         });
         let stated = marked.or_else(|| WavelengthUnit::named_in(&heading));
         let unit = options.unit.or(stated).unwrap_or(WavelengthUnit::Nm);
-        let values = rows.iter().map(|&row| unit.in_nm(sheet.value(row, column))).collect();
+        let mut values: Vec<f64> = rows.iter().map(|&row| unit.in_nm(sheet.value(row, column))).collect();
+        // The corner of a table whose heading holds numbers.
+        if let [0.0, below @ ..] = values.as_slice()
+            && below.len() > 1
+            && axis::check(below).is_ok()
+        {
+            values.remove(0);
+            rows.remove(0);
+        }
         let is_stated = options.unit.is_none() && stated.is_some();
         Column {
             column,
