@@ -16,9 +16,8 @@ demo:
 
 test: driver python
 	cargo test --locked --release
-	@sh scripts/wheel.sh $(VENV) target/wheel -m 'not slow'
 
-# The Python package alone: its wheel, installed into a fresh environment.
+# The Python package: its wheel, installed into a fresh environment.
 test-python: driver python
 	@sh scripts/wheel.sh $(VENV) target/wheel -m 'not slow'
 

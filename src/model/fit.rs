@@ -253,10 +253,10 @@ mod tests {
                 .map(|i| {
                     // Centred, 0.25 and `size` with either sign.
                     let sign = |bit: u32| if i >> bit & 1 == 0 { 2.0 } else { 0.0 };
-                    vec![0.25 * sign(0), 0.25 * sign(0), size * sign(1), 0.0]
+                    vec![0.25 * sign(0), 0.25 * sign(0), size * sign(1), 0.5, 0.5]
                 })
                 .collect();
-            let grid = Grid::new(400.0, 10.0, 4).unwrap();
+            let grid = Grid::new(400.0, 10.0, 5).unwrap();
             let table = Table::new("signs", grid.wavelengths().collect(), &spectra).unwrap();
             let data = Dataset::new(&[table], grid, Extrapolation::Error).unwrap();
             Fit::new(SpectrumKind::Reflectance).components(2).fit(&data).map(|model| model.components())
