@@ -52,8 +52,9 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
     write("fine.json", &fine.to_json());
     write("two.csv", "nm,a,b\n380,1,2\n540,1,2\n780,1,2\n");
     write("short.csv", "500,1\n540,2\n600,3\n");
-    let dips =
-        (40..=70).map(|ten| format!("{ten}0,{}\n", if ten == 50 { -1 } else { 2 })).collect::<String>();
+    let dips = (40..=70)
+        .map(|ten| format!("{ten}0,{}\n", if ten == 50 { "-0.2" } else { "2.0" }))
+        .collect::<String>();
     write("negative.csv", &dips);
     let coarse = Scene::parse("ok.toml", &file("", "seed", ""), folder.path());
     assert!(coarse.is_ok(), "the file that is changed below is a good one");
