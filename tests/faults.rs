@@ -105,7 +105,7 @@ fn verdict(folder: &Path, output: &Output, whole: &[(String, Vec<u8>)]) -> Optio
     let is_of_rust = said.contains("failed to allocate an alternative stack");
     match output.status.code() {
         None | Some(101 | 134) if is_of_rust => half(),
-        _ if said.contains("panicked") => Some(format!("it panics: {said}")),
+        _ if said.contains("panicked") && !is_of_rust => Some(format!("it panics: {said}")),
         None => Some(format!("it is ended by a signal: {}", output.status)),
         Some(124 | 125..) => Some(format!("it hangs: {}", output.status)),
         // What cannot be deleted is left beside it.
