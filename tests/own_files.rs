@@ -115,7 +115,7 @@ fn refusals_name_value_place_and_remedy() {
                 save('index.csv', R, w=np.arange(1, 32))\n\
                 save('zero.csv', np.where((w < 430)[:, None], 0, R))\n\
                 np.savetxt('both.csv', np.r_[[np.r_[0, 405:706:10]], np.c_[w, np.tile(R[:, :1], 31)]], delimiter=',', fmt='%.6g')\n\
-                open('commas.csv', 'w').write('400,1,0,2\\n410,1,0,3\\n420,1,0,4\\n')\n\
+                open('commas.csv', 'w').write('400,1,2,3\\n410,1,3,2\\n420,2,1,4\\n')\n\
                 print('written')";
     assert_eq!(python(folder, code), "written");
     let refusals = [
@@ -134,7 +134,7 @@ fn refusals_name_value_place_and_remedy() {
         ("um.csv", "runs from 0.4 to 0.7", "--unit um"),
         ("index.csv", "counts from 1 to 31", "--layout"),
         ("zero.csv", "every spectrum is 0 at 3 wavelengths from 400 to 420 nm", "--wavelengths"),
-        ("commas.csv", "400,1; 0,2", "--decimal"),
+        ("commas.csv", "400,1; 2,3", "--decimal"),
     ];
     for (file, place, remedy) in refusals {
         let run = format!("fit {file} --kind reflectance -k 2 -o m.json");
