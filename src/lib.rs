@@ -57,6 +57,7 @@ pub use dataset::{
 pub use draw_status::DrawStatus;
 pub use engine::{
     Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, WantedAdapter, adapters,
+    wanted_backends,
 };
 pub use grid::{Extrapolation, Grid, GridError};
 pub use model::{BuiltinData, Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};

@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 use spectroll::export::{DrawExport, Output, Writing};
 use spectroll::output::SetStatus;
-use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Model, Stream};
+use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Model, Stream, wanted_backends};
 
 use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, Purpose, RecipeArguments};
@@ -113,17 +113,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return Ok(output.check_space(&schema, &companions)?);
     }
     output.check_space(&schema, &companions)?;
-    // Who has no graphics hardware knows; who hides it may not.
-    let hidden = std::env::var("WGPU_BACKEND").unwrap_or_default();
-    let (why, told) = match (arguments.engine.choice().unwrap_or_default(), engine.adapter()) {
-        (EngineChoice::Auto, None) if hidden.is_empty() => {
-            (", no graphics hardware was found".to_owned(), false)
-        }
-        (EngineChoice::Auto, None) => {
-            (format!(", no graphics hardware was found with WGPU_BACKEND={hidden}"), true)
-        }
-        _ => (String::new(), false),
-    };
+    // Who has no graphics hardware knows; who hides it may not, and is told.
+    let is_fallback =
+        arguments.engine.choice().unwrap_or_default() == EngineChoice::Auto && engine.adapter().is_none();
+    let hidden = wanted_backends()
+        .filter(|_| is_fallback)
+        .map_or_else(String::new, |value| format!(" with WGPU_BACKEND={value}"));
+    let why = if is_fallback { format!(", no graphics hardware was found{hidden}") } else { String::new() };
 
     let files = output.text_files(&schema, &companions);
     let start = Instant::now();
@@ -153,7 +149,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             seconds,
             draws_per_second: summary.draws as f64 / seconds,
             engine: format!("{engine}{why}"),
-            drawn_by: if told { format!("{engine}{why}") } else { engine.to_string() },
+            drawn_by: if hidden.is_empty() { engine.to_string() } else { format!("{engine}{why}") },
             version: env!("CARGO_PKG_VERSION"),
         },
     )

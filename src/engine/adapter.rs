@@ -61,6 +61,11 @@ fn variable(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|value| !value.trim().is_empty())
 }
 
+/// The interfaces to which the variable `WGPU_BACKEND` limits adapters, as it has them; `None` where it limits nothing.
+pub fn wanted_backends() -> Option<String> {
+    variable(BACKEND)
+}
+
 /// The interfaces that this build can reach adapters by.
 pub(super) fn compiled() -> String {
     let names = wgpu::Instance::enabled_backend_features().iter_names();
@@ -70,7 +75,7 @@ pub(super) fn compiled() -> String {
 
 /// Remedy where no adapter was found.
 pub(super) fn remedy() -> String {
-    match variable(BACKEND) {
+    match wanted_backends() {
         Some(value) => format!("the variable {BACKEND} is {value:?} and hides all others, unset it"),
         None => "install a Vulkan driver (Debian: mesa-vulkan-drivers)".to_owned(),
     }
@@ -124,7 +129,7 @@ fn position(wanted: &str, all: &[Adapter]) -> Option<usize> {
 fn enumerate() -> Result<Vec<wgpu::Adapter>, EngineError> {
     let compiled = wgpu::Instance::enabled_backend_features();
     let mut backends = compiled;
-    if let Some(value) = variable(BACKEND) {
+    if let Some(value) = wanted_backends() {
         if value.split(',').any(|name| wgpu::Backends::from_comma_list(name).is_empty()) {
             return Err(EngineError::UnknownBackend { value });
         }

@@ -19,7 +19,7 @@ use half::f16;
 use serde::Serialize;
 
 use adapter::Wanted;
-pub use adapter::{Adapter, adapters};
+pub use adapter::{Adapter, adapters, wanted_backends};
 pub(crate) use schedule::{Job, Schedule};
 pub use session::Session;
 

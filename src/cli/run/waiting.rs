@@ -1,8 +1,10 @@
 //! A word about work that takes long before anything is drawn.
 
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread::{Builder, JoinHandle};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+
+use crate::threads;
 
 /// Time without a word.
 const SILENCE: Duration = Duration::from_secs(2);
@@ -29,7 +31,7 @@ impl Waiting {
             }
         };
         // Where no thread starts, the work goes on in silence.
-        Waiting(Builder::new().spawn(tell).ok().map(|thread| (ended, thread)))
+        Waiting(threads::spawn(tell).ok().map(|thread| (ended, thread)))
     }
 }
 
