@@ -14,7 +14,7 @@ from . import _spectroll
 from ._layout import Arrays
 from ._model import Model
 from ._values import (
-    COLOURS,
+    OF_QUANTITIES,
     choice,
     indices_of,
     len_of,
@@ -164,8 +164,9 @@ class Sampler:
         found = self._natives.get(quantities)
         if found is None:
             settings = {**self._settings, "quantities": quantities}
-            if not COLOURS.intersection(quantities):
-                settings.update(illuminant="d65", xyz_scale="absolute")
+            for setting, (default, needed) in OF_QUANTITIES.items():
+                if not needed.intersection(quantities):
+                    settings[setting] = default
             # In 16 bits or not makes a difference where spectra are drawn.
             dtype = self._dtype if "spectra" in quantities else "float32"
             text = json.dumps(settings)

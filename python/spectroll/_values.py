@@ -17,7 +17,11 @@ Wavelengths = str | ArrayLike
 LAST = 2**64 - 1
 
 QUANTITIES = ("spectra", "weights", "xyz", "linear_srgb", "lrv", "attempts", "intensity", "chromaticity")
-COLOURS = frozenset({"xyz", "linear_srgb", "chromaticity"})
+# Settings that mean something to some quantities alone, which the library refuses beside others: their defaults, and these.
+OF_QUANTITIES = {
+    "illuminant": ("d65", frozenset({"xyz", "linear_srgb", "chromaticity"})),
+    "xyz_scale": ("absolute", frozenset({"xyz", "linear_srgb"})),
+}
 
 
 def whole(name: str, value: Any, least: int = 0, most: int = LAST) -> int:
