@@ -30,11 +30,15 @@ pub fn table(ending: &str, bytes: &[u8]) {
     }
 }
 
-/// The text of a model file, from which a recipe is made where it is small.
+/// The text of a model file.
 pub fn model(text: &str) {
     if let Ok(model) = Model::from_json("x.json", text) {
         let again = Model::from_json("x.json", &model.to_json());
-        assert!(again.is_ok_and(|again| again == model), "a model file is read as it was written");
+        // That its basis had to be corrected is no part of it.
+        assert!(
+            again.is_ok_and(|again| again.parts() == model.parts()),
+            "a model file is read as it was written"
+        );
     }
 }
 
