@@ -1,7 +1,9 @@
 //! What each target does with its bytes. The corpora in `corpus/` are replayed by `tests/corpus.rs` of the crate itself,
 //! which includes this file.
 
+use std::ffi::OsString;
 use std::fs;
+use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use spectroll::output::{SetAudit, Sidecar};
@@ -21,8 +23,59 @@ fn folder() -> PathBuf {
 pub fn table(ending: &str, bytes: &[u8]) {
     let path = folder().join(format!("x.{}", if ending == "text" { "txt" } else { ending }));
     fs::write(&path, bytes).expect("there is room");
-    let read = Table::open(&path, None).or_else(|_| Table::open_on(&path, None, Some(Grid::DEFAULT)));
-    // What is read is put on a grid, as a fit would; a fit itself is of any numbers, and slow.
+    read(&path);
+}
+
+/// Measured spectra in an archive of this ending, whose files are [`parts`]. They are stored and not packed: a sum that
+/// does not fit would end every other attempt before the reader sees it.
+pub fn archive(ending: &str, bytes: &[u8]) {
+    let Some(parts) = parts(bytes) else { return table(ending, bytes) };
+    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    for (name, content) in parts {
+        // A name that is there twice is refused by the writer.
+        if zip.start_file(name, options).is_ok() {
+            zip.write_all(content).expect("memory takes it");
+        }
+    }
+    table(ending, &zip.finish().expect("memory takes it").into_inner());
+}
+
+/// Measured spectra in a folder, or in a file beside another, whose files are [`parts`]; `name` is what is read.
+pub fn files(name: &str, bytes: &[u8]) {
+    let Some(parts) = parts(bytes) else { return };
+    let folder = folder().join("files");
+    let _ = fs::remove_dir_all(&folder);
+    for (part, content) in parts {
+        let is_plain = part.split('/').all(|step| !step.starts_with('.') && !step.is_empty());
+        let path = folder.join(part);
+        if is_plain && fs::create_dir_all(path.parent().expect("it is in a folder")).is_ok() {
+            // A name may be that of a folder.
+            let _ = fs::write(&path, content);
+        }
+    }
+    read(&folder.join(name));
+}
+
+/// Files with their names: each begins with a line of its name and its number of bytes.
+fn parts(bytes: &[u8]) -> Option<Vec<(&str, &[u8])>> {
+    let mut parts = Vec::new();
+    let mut rest = bytes;
+    while !rest.is_empty() && parts.len() < 50 {
+        let end = rest.iter().take(100).position(|byte| *byte == b'\n')?;
+        let (name, length) = std::str::from_utf8(&rest[..end]).ok()?.rsplit_once(' ')?;
+        let content = &rest[end + 1..];
+        let (content, after) = content.split_at(length.parse::<usize>().ok()?.min(content.len()));
+        parts.push((name, content));
+        rest = after;
+    }
+    Some(parts)
+}
+
+/// Reads measured spectra as a fit would.
+fn read(path: &Path) {
+    let read = Table::open(path, None).or_else(|_| Table::open_on(path, None, Some(Grid::DEFAULT)));
+    // What is read is put on a grid; a fit itself is of any numbers, and slow.
     if let Ok(table) = read
         && table.wavelengths().len() < 1000
     {
@@ -80,6 +133,17 @@ pub fn recipe(text: &str) {
     if settings.lrv.is_none() && settings.xyz.is_none() {
         let model = Model::builtin("munsell-vrhel").expect("it is built in");
         let _ = settings.builder(&model).build();
+    }
+}
+
+/// A configuration, which says the same as the words of a command line.
+pub fn config(text: &str) {
+    let path = folder().join("x.toml");
+    fs::write(&path, text).expect("there is room");
+    for command in ["sample", "scene", "fit", "report"] {
+        let words =
+            ["spectroll", command, "--config"].map(OsString::from).into_iter().chain([path.clone().into()]);
+        let _ = spectroll::cli::understands(words.collect());
     }
 }
 

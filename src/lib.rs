@@ -7,6 +7,8 @@ mod grid;
 pub mod plain_file;
 pub mod suggestion;
 mod threads;
+#[doc(hidden)]
+pub mod wording;
 
 mod dataset;
 
@@ -42,6 +44,17 @@ pub mod export;
 #[cfg(feature = "report")]
 #[doc(hidden)]
 pub mod evaluation;
+
+// The code of the pages, which is compiled and run with that of the items. `tests/commands.rs` sees to it that none is missing.
+#[cfg(doctest)]
+mod pages {
+    #[doc = include_str!("../docs/guide.md")]
+    mod guide {}
+    #[doc = include_str!("../docs/scenes.md")]
+    mod scenes {}
+    #[doc = include_str!("../docs/embedding.md")]
+    mod embedding {}
+}
 
 // The program, which other hosts may carry as well, as the Python package does. It names the library as they do.
 #[cfg(feature = "cli")]

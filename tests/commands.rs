@@ -6,7 +6,7 @@
 //! - a block of `toml` or `csv` is written to the file that its first line names, as in `# mine.csv`;
 //! - a block of `python` is run, and may look at the files that the commands before it left, but for those that import
 //!   the package of this project: `python/tests` runs these;
-//! - blocks of `rust` are doctests, and those of `wgsl` and `text` are left alone.
+//! - blocks of `rust` are doctests, of a page that `src/lib.rs` includes, and those of `wgsl` and `text` are left alone.
 //!
 //! Commands are run as they stand, but for their size: [`lowered`] says how. Lines of other programs are left alone if
 //! they are [`KNOWN`], and an error if they are not; so is any syntax of the shell that is more than words, a
@@ -277,6 +277,20 @@ fn failures(document: &Path) -> Vec<String> {
 fn every_command_of_the_documents_runs() {
     let failures: Vec<_> = documents().par_iter().flat_map_iter(|document| failures(document)).collect();
     assert!(failures.is_empty(), "{} commands fail:\n{}", failures.len(), failures.join("\n"));
+}
+
+/// Rust in a page that no doctest reads would rot.
+#[test]
+fn every_page_with_rust_is_a_doctest() {
+    let library = fs::read_to_string(root().join("src/lib.rs")).expect("it can be read");
+    for document in documents() {
+        let text = fs::read_to_string(&document).expect("it can be read");
+        let path = document.strip_prefix(root()).expect("it is in the project").display().to_string();
+        let has_rust =
+            blocks(&text).expect("its blocks are sound").iter().any(|block| block.language == "rust");
+        let is_included = library.contains(&format!("include_str!(\"../{path}\")"));
+        assert_eq!(has_rust, is_included, "{path}");
+    }
 }
 
 /// One for the scientist, the trainer of models and the renderer's author.

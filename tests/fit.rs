@@ -226,7 +226,7 @@ fn what_is_not_a_model_says_why() {
         ("basis", json!([[1.2, 1.6, 0.0], [-0.8, 0.6, 0.0]]), "basis vectors 1 and 1 have the product 4"),
         ("basis", json!([[0.6, 0.8, 0.0], [-0.8, 0.6001, 0.0]]), "basis vectors 2 and 1 have the product"),
         ("basis", json!([]), "this one has 0 for 3 bands"),
-        ("weight_mean", json!([0.0]), "weight_mean has 1 values where the rest of the model needs 2"),
+        ("weight_mean", json!([0.0]), "weight_mean has 1 value where the rest of the model needs 2"),
         (
             "weight_covariance",
             json!([[0.02, 0.01]]),
@@ -237,7 +237,7 @@ fn what_is_not_a_model_says_why() {
         (
             "explained_variance",
             json!([0.9]),
-            "explained_variance has 1 values where the rest of the model needs 2",
+            "explained_variance has 1 value where the rest of the model needs 2",
         ),
         ("normalization", json!("maximum"), "unknown variant `maximum`"),
         ("colour", json!("red"), "unknown field `colour`"),

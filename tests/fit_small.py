@@ -66,7 +66,7 @@ def fitted(program, folder, number):
     if run.returncode:
         # What lies within a factor of ten of the tolerance may count or not.
         near = bool(np.any((values > noise / 10) & (values < noise * 10)))
-        found = re.search(r"rank (\d+)|are identical|need at least (\d+) spectra", run.stderr)
+        found = re.search(r"rank (\d+)|are identical|takes at least (\d+) spectra", run.stderr)
         assert found, f"{what}: {run.stderr}"
         if found[2]:
             assert k > count - 1, f"{what}: {run.stderr}"

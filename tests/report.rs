@@ -6,6 +6,7 @@ use std::fs;
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
+use program::{fails, files, succeeds};
 use serde_json::Value;
 
 /// The folder of a report that gets SIGINT once its second section begins.
@@ -50,4 +51,34 @@ fn an_interrupted_report_keeps_what_is_done() {
         json["models"][0]["convergence"]["curves"][0]["points"][0]["seconds"]["median"].as_f64().unwrap()
             > 0.0
     );
+}
+
+/// The page needs nothing else, and the numbers are all there.
+#[test]
+fn a_report_is_a_folder_that_appears_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("mine")).unwrap();
+    fails(folder.path(), "report -o mine --quick", 1, "exists already");
+    fails(folder.path(), "report -o mine --quick --force", 1, "not a report");
+    fails(folder.path(), "report -o x --quick --full", 2, "cannot be used with");
+    fails(folder.path(), "report -o no/such --quick", 1, "create it first");
+    fails(folder.path(), "report nonesuch -o x --quick", 2, "neither a file nor a built-in model");
+
+    let (out, _) = succeeds(folder.path(), "report granada -o x --quick --engine cpu --seed 5");
+    assert!(out.contains("36 of 36 stiff and extreme cases"), "{out}");
+    assert_eq!(files(folder.path()), ["mine", "x"]);
+    let x = folder.path().join("x");
+    let page = fs::read_to_string(x.join("report.html")).unwrap();
+    let svgs = files(&x).iter().filter(|name| name.ends_with(".svg")).count();
+    assert_eq!(page.matches("<svg").count(), svgs);
+    let loads = ["src=", "href=\"http", "@import", "url(http"];
+    assert!(loads.iter().all(|load| !page.contains(load)), "the page loads something");
+    for figure in page.split("<figcaption>").skip(1) {
+        assert!(figure.contains("Seed 5.") && figure.contains(" UTC."), "{figure}");
+    }
+    let text = fs::read_to_string(x.join("report.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&json["seed"], &json["effort"]), (&5.into(), &"quick".into()));
+    let curves = json["models"][0]["convergence"]["curves"].as_array().unwrap();
+    assert!(curves.len() >= 2 && curves.iter().all(|curve| curve["points"].as_array().unwrap().len() >= 2));
 }

@@ -1,11 +1,11 @@
-//! Scenes in files whose names say what spectra are: folders of text, and MATLAB's.
+//! Scenes in files: what the program plans, prints and pictures of them, arrays alone, folders of text, and MATLAB's.
 
 mod program;
 
 use std::fs;
 use std::path::Path;
 
-use program::{fails, files, python, succeeds};
+use program::{fails, files, npy, python, succeeds};
 
 /// Two scenes of lights that vary, a wall that does not, and targets at two levels.
 const SCENE: &str = r#"
@@ -314,4 +314,102 @@ fn colours_have_arrays_of_their_own() {
         plan.contains("back-wall: its spectra are not stored, for quantities does not name them"),
         "{plan}"
     );
+}
+
+#[test]
+fn scenes_are_drawn_planned_and_pictured() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let (text, _) = succeeds(folder.path(), "scene --example condition2");
+    fs::write(path("mine.toml"), text).unwrap();
+    let (plan, _) = succeeds(folder.path(), "scene mine.toml --dry-run --engine gpu");
+    for part in ["lights: 3 a scene, by shader 1", "background: [999, 31]", "1 shader compiled", "left out"] {
+        assert!(plan.contains(part), "{plan}");
+    }
+    for name in ["a.npz", "a.zarr", "a.h5", "a.mat", "a.parquet", "parts/ --format npy"] {
+        succeeds(folder.path(), &format!("scene mine.toml --scenes 10..14 -o {name} --engine cpu"));
+    }
+    succeeds(folder.path(), "scene mine.toml --scenes 0..3 --only target -o a.csv --engine cpu");
+    let csv = fs::read_to_string(path("a.csv")).unwrap();
+    assert!(csv.starts_with("target_0_400,target_0_410,") && csv.lines().count() == 4, "{csv}");
+    let (json, _) = succeeds(folder.path(), "scene mine.toml --scenes 0..5 -o b.npz --json --engine cpu");
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((json["draws"].as_u64(), json["shaders"].as_u64()), (Some(5 * 4 + 999), Some(0)));
+    let (_, told) = succeeds(folder.path(), "scene mine.toml --preview a.png --engine cpu");
+    assert!(told.contains("wrote a.png"), "{told}");
+    succeeds(folder.path(), "scene mine.toml --preview a.png --force --engine cpu");
+    for (arguments, code, message) in [
+        ("mine.toml", 2, "say where to with -o"),
+        ("mine.toml --only walls -o x.npz", 2, "there are lights, background, target"),
+        ("mine.toml --scenes 5..2000 -o x.npz", 2, "the file has 1000 scenes"),
+        ("mine.toml --scenes 5..1 -o x.npz", 2, "expected A..B"),
+        ("absent.toml -o x.npz", 2, "cannot read the scene file"),
+        ("--example condition9 -o x.npz", 2, "condition1, condition2, condition3"),
+        ("mine.toml --preview a.png", 1, "exists already"),
+        ("mine.toml -o x.npy", 2, "choose one array, or name it .npz, .zarr, .h5 or .parquet (--arrays)"),
+        (
+            "mine.toml --dry-run -o x.npy",
+            2,
+            "choose one array, or name it .npz, .zarr, .h5 or .parquet (--arrays)",
+        ),
+        ("mine.toml --arrays target_lrv --format spd -o x/", 2, "choose the spectra of one group or more"),
+        (
+            "mine.toml --arrays light -o x.npy",
+            2,
+            "no array \"light\", did you mean \"lights\"?; there are lights,",
+        ),
+        // What cannot be written is found out before a picture is made.
+        ("mine.toml --preview new.png -o x.xlsx", 2, "name it .npy"),
+        ("mine.toml --preview new.png -o a.npz", 1, "exists already"),
+        ("mine.toml --preview new.png -o no/such.npz", 1, "create it first"),
+        ("mine.toml --preview new.jpg -o x.npz", 2, "a .png or a .pdf"),
+        ("mine.toml --preview a.png -o x.npz", 1, "exists already"),
+    ] {
+        fails(folder.path(), &format!("scene {arguments}"), code, message);
+    }
+    // The group alone is what it is among the others, and dimensions have the names that xarray will show.
+    let python = std::env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    succeeds(folder.path(), "scene mine.toml --scenes 12..14 --only target -o t.npz --engine cpu");
+    let code = "import json, numpy as np; a, t = np.load('a.npz'), np.load('t.npz'); \
+                assert (a['target'][2:] == t['target']).all(); \
+                m = json.load(open('a.zarr/zarr.json'))['consolidated_metadata']['metadata']; \
+                assert m['lights']['dimension_names'] == ['scene', 'lights_number', 'wavelength'], m['lights']; \
+                b = np.fromfile('a.zarr/background/c.0.0', '<f4').reshape(999, 31); \
+                assert (b == a['background']).all() and (b == np.load('parts/background.npy')).all()";
+    let output = Command::new(python).args(["-c", code]).current_dir(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// One array makes a file of formats that hold one, and is what it is among the others.
+#[test]
+fn arrays_of_scenes_are_written_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let scene = "scene --example condition2 --scenes 3..5 --engine cpu";
+    succeeds(folder.path(), &format!("{scene} --arrays lights -o lights.npy"));
+    succeeds(folder.path(), &format!("{scene} --arrays target_lrv,target -o some.npz"));
+    succeeds(folder.path(), &format!("{scene} --arrays lights --format spd -o lights/"));
+    succeeds(folder.path(), &format!("{scene} --arrays background -o background.npy"));
+    succeeds(folder.path(), &format!("{scene} -o all.npz"));
+    let (plan, _) = succeeds(folder.path(), &format!("{scene} --arrays lights --dry-run"));
+    assert!(plan.contains("lights: [2, 3, 31]") && !plan.contains("background:"), "{plan}");
+    let (shape, lights) = npy(&path("lights.npy"));
+    assert_eq!(shape, [2, 3, 31]);
+    assert_eq!(npy(&path("background.npy")).0, [2, 999, 31]);
+
+    // Numbered from 1 in each scene.
+    let numbers = [3, 4].into_iter().flat_map(|scene| (1..=3).map(move |number| (scene, number)));
+    let names: Vec<_> =
+        numbers.map(|(scene, number)| format!("scene-{scene:04}-illuminance_{number:03}.spd")).collect();
+    assert_eq!(files(&path("lights/lights")), names);
+    for (name, light) in names.iter().zip(lights.chunks(31)) {
+        let text = fs::read_to_string(path("lights/lights").join(name)).unwrap();
+        let values: Vec<f32> =
+            text.lines().map(|line| line.split(' ').nth(1).unwrap().parse().unwrap()).collect();
+        assert_eq!(values, light);
+    }
+    let code = "import numpy as np; a, s = np.load('all.npz'), np.load('some.npz'); \
+                assert 'background' not in s and 'lights' not in s; \
+                assert (s['target'] == a['target']).all() and (np.load('lights.npy') == a['lights']).all()";
+    program::python(folder.path(), code);
 }

@@ -20,7 +20,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ._data import Spectra, read
+    from ._data import Spectra, read, tables
     from ._model import Model, models
     from ._sampler import Sampler
     from ._scene import Scene
@@ -42,6 +42,7 @@ _HOMES = {
     "adapters": "_system",
     "models": "_model",
     "read": "_data",
+    "tables": "_data",
     "write": "_write",
 }
 
@@ -58,6 +59,7 @@ __all__ = [
     "adapters",
     "models",
     "read",
+    "tables",
     "write",
 ]
 

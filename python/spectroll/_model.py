@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _spectroll
-from ._data import Spectra
+from ._data import Spectra, onto
 from ._values import Wavelengths, wavelengths_of, whole
 
 
@@ -66,25 +66,34 @@ class Model:
         components: int | float = 6,
         normalize: str | None = None,
         at: Wavelengths | None = None,
+        resample: str = "auto",
+        missing: str = "error",
         extrapolate: str = "error",
     ) -> Model:
         """A model of measured spectra, by their principal components.
+
+        >>> measured = spectroll.read("mine.csv", unit="um", scale=0.01, missing_values=-999)
+        >>> model = Model.fit(measured, kind="reflectance", components=8, at="400:5:700", missing="drop")
 
         Parameters
         ----------
         X : array, (spectra, bands), or what `read` returns, or a list of such
             Reflectances from 0 to 1, or powers of lights in any unit.
         wavelengths : array, (bands,), or text as in "400:10:700"
-            The wavelengths of an array, in nm. `Spectra` have their own.
+            The wavelengths of an array, in nm. `Spectra` have their own; those of the model are asked for by `at`.
         kind : "reflectance" or "illuminant"
-            May be left out where `Spectra` say it.
+            May be left out where `Spectra` say it, and wins where it is given.
         components : int, or a share of the variance below 1 (6)
             Number of principal components, or the share of the variance that they are to explain.
         normalize : "mean", "integral" or "none"
             What each spectrum is divided by; illuminants by their mean power unless this says otherwise.
         at : array in nm, or text
-            The wavelengths of the model, where they are others than those of the first spectra: a not-a-knot cubic spline
-            interpolates.
+            The wavelengths of the model, even or not, where they are others than those of the first spectra; "as-measured"
+            leaves out those at which nothing was measured.
+        resample : "auto", "interpolate" or "average"
+            How spectra come to these wavelengths: see `Spectra.at`.
+        missing : "error", "drop" or "interpolate"
+            What is done with spectra that lack a value which the wavelengths of the model need.
         extrapolate : "error", "hold" or "zero"
             What is done where `at` goes beyond the measured wavelengths.
         """
@@ -114,7 +123,7 @@ class Model:
             count,
             share,
             normalize,
-            extrapolate,
+            onto(resample, missing, extrapolate),
         )
         return cls._of(native)
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _spectroll
 from ._layout import Arrays
 from ._model import Model
+from ._settings import illuminant_of, intensity_of, lrv_of, shown
 from ._values import (
     OF_QUANTITIES,
     choice,
@@ -36,24 +37,33 @@ Drawn = Any
 
 DTYPES = ("float32", "float16")
 LAYOUTS = ("rows", "padded-rows", "planes")
-ILLUMINANTS = ("d65", "a", "e")
 
 
 class Sampler:
     """Draws of a model with given settings.
 
+    >>> surfaces = spectroll.Sampler("munsell-vrhel", lrv=0.4, bounds="both")
+    >>> surfaces.sample(1000, rng=7).shape                      # fresh draws; the same for the same rng
+    (1000, 31)
+    >>> lights = spectroll.Sampler("granada", intensity=(0.1, 10))
+    >>> drawn = lights.draw(range(1000), seed=7, quantities=["spectra", "xyz"])
+    >>> drawn["xyz"].shape                                      # draw i depends on the seed and i alone
+    (1000, 3)
+
     Parameters
     ----------
-    model : Model, str or path
-        What is drawn from: a model, the name of a built-in one, or a model file.
+    model : Model, str or path ("munsell-vrhel")
+        What is drawn from: a model, a built-in one ("munsell-vrhel" has reflectances, "granada" daylights; `models()` lists
+        all), or a model file.
     lrv : float, or (low, high), optional
         Scales each reflectance to this luminous reflectance value (CIE Y of the 1931 2 degree observer under D65, a perfect
         white being 1), or to one of its own, uniform between two.
     xyz : (X, Y, Z), optional
-        Gives each reflectance these tristimulus values under D65, where a perfect white has Y = 1.
+        Gives each reflectance these tristimulus values under D65 (whatever `illuminant` says), where a perfect white has
+        Y = 1. In place of an `lrv`.
     bounds : "base", "scaled" or "both" ("base")
         The spectrum that must be above 0 and below 1 where there is an `lrv`: before scaling, after it, or both. With
-        "base", as in the paper, scaled values can exceed 1.
+        "base", as in Singh et al. 2018, scaled values can exceed 1. Illuminants must be above 0.
     covariance_scale : float (1)
         Factor of the weights' covariance.
     intensity : float, (low, high) or "data", optional
@@ -62,10 +72,11 @@ class Sampler:
         What reflectances have their XYZ, chromaticity and linear sRGB under.
     xyz_scale : "absolute" or "unit-y" ("absolute")
         Scale of the XYZ and linear sRGB of illuminants: sums of power x colour matching function x step in nm, or Y = 1.
+        Those of reflectances are on the scale where a perfect white under the illuminant has Y = 1.
     proposal : "auto", "plain" or "cover" ("auto")
         Where candidates come from; "cover" finds spectra that plain rejection would hardly ever find.
     max_attempts : int (65000)
-        The most candidates of a draw.
+        The most candidates of a draw: `EngineError` names the draw that finds none.
     dtype : "float32" or "float16" ("float32")
         Type of the spectra. Other quantities are float32, and attempts uint32.
     layout : "rows", "padded-rows" or "planes" ("rows")
@@ -76,7 +87,10 @@ class Sampler:
     threads : int, optional
         Threads of the CPU engine, one per core unless given. With 1, draws are made on the thread that calls.
 
-    Draw i depends on the model, these settings but the last two, the seed, the stream and i, and on nothing else.
+    Settings that mean nothing to the model's kind, as an `lrv` of illuminants, are a `ValueError`.
+
+    Draw i depends on the model, the settings but `layout`, `engine` and `threads`, the seed, the stream and i, and on nothing
+    else.
 
     Samplers are immutable, can be pickled, and may be used by several threads, and after a fork or in spawned processes:
     each process opens an engine of its own.
@@ -111,12 +125,12 @@ class Sampler:
         threads: int | None = None,
     ) -> None:
         settings = {
-            "lrv": _lrv(lrv),
+            "lrv": lrv_of(lrv),
             "xyz": None if xyz is None else [float(value) for value in xyz],
             "bounds": choice("bounds", bounds, ("base", "scaled", "both")),
             "cov_scale": float(covariance_scale),
-            "intensity": _intensity(intensity),
-            "illuminant": _illuminant(illuminant),
+            "intensity": intensity_of(intensity),
+            "illuminant": illuminant_of(illuminant),
             "xyz_scale": choice("xyz_scale", xyz_scale, ("absolute", "unit-y")),
             "proposal": choice("proposal", proposal, ("auto", "plain", "cover")),
             "max_attempts": whole("max_attempts", max_attempts, 0, 2**32 - 1),
@@ -180,26 +194,31 @@ class Sampler:
     # Draws
 
     def sample(self, n: int, *, rng: Any = None, quantities: Quantities = None) -> Drawn:
-        """n random draws.
+        """n random draws, for whoever wants some: `draw` makes those of given indices, for data sets that can be made again
+        piece by piece.
 
         Parameters
         ----------
         n : int
         rng : None, int, numpy.random.Generator, or whatever `numpy.random.default_rng` takes
-            Source of the seed (SPEC 7): the same number gives the same draws, a generator gives others each time, and None
-            too.
+            Source of the seed, as NumPy and SciPy have it (SPEC 7): the same number gives the same draws; a generator gives
+            others each time, and so does None. A number is no seed of `draw`, whose draws are others.
         quantities : str, or list of str ("spectra")
-            One name gives an array, a list of names a mapping of arrays: "spectra", "weights", "xyz", "linear_srgb", "lrv",
-            "attempts", "intensity", "chromaticity".
+            One name gives an array, a list of names a mapping of arrays by name:
+
+            - "spectra", (n, bands): after scaling to an lrv or an intensity;
+            - "weights", (n, components): of the model's components, before scaling;
+            - "xyz", (n, 3): CIE 1931 (2 degree observer), of reflectances under the illuminant;
+            - "linear_srgb", (n, 3): of the XYZ by the matrix of D65, neither clipped nor adapted to another white;
+            - "chromaticity", (n, 2): x and y of the XYZ;
+            - "lrv", (n,): luminous reflectance under D65, of reflectances;
+            - "intensity", (n,): the factor of each illuminant, where `intensity` is set;
+            - "attempts", (n,) uint32: the number of candidates that each draw took.
 
         Returns
         -------
         array, (n, bands) float32 for spectra, or a mapping
             Reflectances are from 0 to 1, powers of illuminants in the model's unit times their intensity.
-
-        Notes
-        -----
-        `draw` and `at` make the draws of given indices, for data sets that can be made again piece by piece.
         """
         return self.draw(range(whole("n", n)), seed=seed_of_rng(rng), quantities=quantities)
 
@@ -217,7 +236,7 @@ class Sampler:
         Parameters
         ----------
         indices : range or int
-            From 0 to 2**64 - 1.
+            From 0 to 2**64 - 1, with any step.
         seed : int (0)
             From 0 to 2**64 - 1; the program's --seed.
         stream : str, optional
@@ -225,8 +244,8 @@ class Sampler:
         quantities : str, or list of str ("spectra")
             See `sample`.
         out : array, or mapping of arrays, optional
-            Where to put the draws: C-contiguous, of the shape and type that would be returned. The CPU writes whole words
-            of 4 bytes there without a copy, and a GPU copies once.
+            Where to put the draws: an array of NumPy with the shape, the type and the order in memory of what would be
+            returned. The CPU engine draws into it without a copy, where a draw takes a multiple of 4 bytes; a GPU copies once.
 
         Returns
         -------
@@ -259,7 +278,7 @@ class Sampler:
         Parameters
         ----------
         ids : array of whole numbers, of any shape
-            From 0 to 2**64 - 1, any number of times.
+            From 0 to 2**64 - 1, any number of times; floats are a `TypeError`.
         seed, stream, quantities, out
             See `draw`.
 
@@ -300,12 +319,13 @@ class Sampler:
 
     @property
     def acceptance(self) -> float:
-        """The share of candidates that are accepted, from 0 to 1, estimated from 65,536 of them."""
+        """The share of candidates that are accepted, from 0 to 1: estimated from 65,536 of them when the sampler is made, the
+        same each time. With a cover, of its candidates."""
         return self._native(("spectra",))[0].acceptance
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings, as data sets record them."""
+        """The settings by name, as data sets record them."""
         settings: dict[str, Any] = json.loads(json.dumps(self._settings))
         return settings
 
@@ -332,7 +352,7 @@ class Sampler:
         return sampler
 
     def wgsl(self, prefix: str = "draw", *, quantities: Quantities = None) -> str:
-        """The draws as functions of WGSL, for shaders of any engine; every name begins with `prefix` and "_". See
+        """The draws as functions of WGSL, as text, for shaders of any engine; every name begins with `prefix` and "_". See
         `spectroll shader --help` and docs/embedding.md for the functions."""
         return self._native(quantities_of(quantities)[0])[0].wgsl(prefix)
 
@@ -369,7 +389,8 @@ class Sampler:
         chunks: int = 2**20,
     ) -> dask.array.Array:
         """Draws as a lazy `dask.array` of (n, bands), in blocks of `chunks` draws. Each task draws on one thread, that which
-        runs it, and any block is the same wherever it is made. `spectroll.dask.write` writes it."""
+        runs it, and any block is the same wherever it is made. An array is of one quantity: make one for each.
+        `spectroll.dask.write` writes several to one store."""
         from .dask import array
 
         return array(self, n, seed=seed, stream=stream, quantities=quantities, chunks=chunks)
@@ -383,11 +404,16 @@ class Sampler:
         quantities: Quantities = None,
         batch_size: int | None = None,
     ) -> Any:
-        """Draws as a data set for `torch.utils.data.DataLoader`.
+        """Draws as a data set for `torch.utils.data.DataLoader`, the same in every epoch.
 
-        Without `batch_size` it is map-style, with `__getitems__` for whole batches, so that any sampler and shuffling works.
-        With it, it is iterable and yields batches; workers and the ranks of `torch.distributed` take turns, so that all
-        together see each draw once.
+        >>> DataLoader(sampler.torch(10**8, seed=7), batch_size=4096, shuffle=True, num_workers=4)
+        >>> DataLoader(sampler.torch(10**8, seed=7, batch_size=4096), batch_size=None, num_workers=4)
+
+        Without `batch_size` it is map-style: item i is the tensor of draw i, (bands,) float32 on the CPU, or a dict of tensors
+        where a list of quantities is asked for, and whole batches are drawn at once, so that any sampler and shuffling works.
+        With it, it is iterable and yields batches, (batch_size, bands), in order; workers and the ranks of
+        `torch.distributed` take turns, so that all together see each draw once, and one may have a batch more than another.
+        Each worker draws on one thread.
         """
         from .torch import dataset
 
@@ -415,10 +441,10 @@ class Sampler:
         default = {"bounds": "base", "cov_scale": 1.0, "illuminant": "d65", "xyz_scale": "absolute"}
         default |= {"proposal": "auto", "max_attempts": 65_000, "dtype": "float32", "layout": "rows"}
         default |= {"engine": "auto"}
-        shown = {**self._settings, "dtype": self._dtype, "layout": self._layout}
-        shown |= {"engine": self._engine, "threads": self._threads}
-        changed = {k: v for k, v in shown.items() if v is not None and v != default.get(k)}
-        words = ", ".join(f"{name}={_shown(value)}" for name, value in changed.items())
+        given = {**self._settings, "dtype": self._dtype, "layout": self._layout}
+        given |= {"engine": self._engine, "threads": self._threads}
+        changed = {k: v for k, v in given.items() if v is not None and v != default.get(k)}
+        words = ", ".join(f"{name}={shown(value)}" for name, value in changed.items())
         model = repr(self._model.name) if self._model.name else repr(self._model)
         return f"<Sampler {model}{', ' if words else ''}{words}: {100 * self.acceptance:.2f} % accepted>"
 
@@ -430,7 +456,7 @@ class Sampler:
     def _repr_html_(self) -> str:
         from ._picture import page
 
-        rows = [(name, _shown(value)) for name, value in self._settings.items() if value is not None]
+        rows = [(name, shown(value)) for name, value in self._settings.items() if value is not None]
         rows.append(("accepted", f"{100 * self.acceptance:.2f} %"))
         return page(repr(self)[1:-1], self._repr_svg_(), rows)
 
@@ -441,59 +467,3 @@ def _restored(
     sampler = Sampler.__new__(Sampler)
     sampler._set(model, settings, dtype, layout, engine, threads)
     return sampler
-
-
-def _shown(value: Any) -> str:
-    """A setting as it was given."""
-    match value:
-        case {"uniform": [low, high]} | {"loguniform": [low, high]}:
-            return f"({low:g}, {high:g})"
-        case {"fixed": number}:
-            return f"{number:g}"
-        case {"power": _}:
-            return "(powers)"
-        case _:
-            return f"{value}" if not isinstance(value, str) else repr(value)
-
-
-def _pair(name: str, value: Any) -> list[float] | None:
-    """Two numbers, where there are two."""
-    if np.ndim(value) == 0:
-        return None
-    pair = [float(each) for each in value]
-    if len(pair) != 2:
-        raise ValueError(f"{name}={value!r}: it is one number, or two between which it lies")
-    return pair
-
-
-def _finite(name: str, *numbers: float) -> None:
-    if not np.isfinite(numbers).all():
-        raise ValueError(f"{name}={numbers[0] if len(numbers) == 1 else numbers}: numbers are finite")
-
-
-def _lrv(lrv: Any) -> Any:
-    if lrv is None:
-        return None
-    pair = _pair("lrv", lrv)
-    _finite("lrv", *(pair or [float(lrv)]))
-    return {"uniform": pair} if pair else float(lrv)
-
-
-def _intensity(intensity: Any) -> Any:
-    if intensity is None:
-        return None
-    if isinstance(intensity, str):
-        return choice("intensity", intensity, ("data",))
-    pair = _pair("intensity", intensity)
-    _finite("intensity", *(pair or [float(intensity)]))
-    return {"loguniform": pair} if pair else {"fixed": float(intensity)}
-
-
-def _illuminant(illuminant: Any) -> Any:
-    if isinstance(illuminant, str):
-        return choice("illuminant", illuminant, ILLUMINANTS)
-    powers = np.asarray(illuminant, np.float64)
-    if powers.ndim != 1:
-        raise ValueError(f"an illuminant of shape {powers.shape}: it is a power for each wavelength")
-    _finite("illuminant", *powers)
-    return {"power": powers.tolist()}

@@ -59,8 +59,9 @@ class Scene:
         self._wavelengths.flags.writeable = False
 
     def scenes(self, start: int = 0, stop: int | None = None) -> dict[str, NDArray[Any]]:
-        """Scenes start to stop - 1: a mapping of arrays by name, (scenes, elements, bands) float32 for spectra. What all
-        scenes share has no axis of scenes, as `arrays` tells. One number is a stop, as in `range`."""
+        """Scenes start to stop - 1: a mapping of arrays by name, (scenes, elements, bands) float32 for spectra, where the
+        elements are the lights or surfaces of a group. What all scenes share has no axis of scenes, as `arrays` tells. One
+        number is a stop, as in `range`, and none asks for all, of which `len` is the number."""
         if stop is None:
             start, stop = 0, start or len(self)
         asked = self._range(range(whole("start", start), whole("stop", stop)))
@@ -75,7 +76,7 @@ class Scene:
 
     @property
     def arrays(self) -> list[SceneArray]:
-        """What each scene has."""
+        """The arrays that `scenes` gives, each with its name, its group, its quantity and the shape of an entry."""
         all = self._native.arrays()
         return [SceneArray(name, group, quantity, tuple(shape), each) for name, group, quantity, shape, each in all]
 

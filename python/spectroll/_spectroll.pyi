@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 __version__: str
 BUILTIN: list[str]
+TABLES: list[str]
 EXAMPLES: list[str]
 
 Grid = str | list[float]
@@ -34,7 +35,7 @@ class Model:
         components: int | None,
         explain: float | None,
         normalize: str | None,
-        extrapolate: str,
+        onto: dict[str, str],
     ) -> Model: ...
     @property
     def name(self) -> str: ...
@@ -97,9 +98,9 @@ class Scene:
     def draw(self, start: int, stop: int) -> list[tuple[str, list[int], str, NDArray[np.uint8], bool]]: ...
 
 def read(
-    path: str, variable: str | None, wavelengths: Grid | None
-) -> tuple[NDArray[np.float64], NDArray[np.float64], str | None, str]: ...
-def resample(table: Table, grid: Grid, extrapolate: str) -> NDArray[np.float64]: ...
+    path: str, settings: dict[str, Any]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], str | None, str, list[str]]: ...
+def resample(table: Table, grid: Grid, onto: dict[str, str]) -> tuple[NDArray[np.float64], list[str]]: ...
 def wavelengths(text: str) -> list[float]: ...
 def write_draws(
     sampler: Sampler, draws: tuple[int, int], source: Source, options: dict[str, Any], progress: Progress

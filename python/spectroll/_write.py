@@ -49,6 +49,11 @@ def write(
 ) -> Written:
     """Writes a data set, with the bytes that `spectroll sample` or `spectroll scene` writes.
 
+    >>> spectroll.write("x.zarr", sampler, 10**8, seed=7, shard=(1, 8), resume=True)       # the second part of eight
+
+    A `.zarr`, and a folder of `.npy` or `.parquet` parts, is a set of chunks, which can be sharded and resumed; anything else
+    is one file. What is written opens with the usual readers, such as `xarray.open_zarr`.
+
     Parameters
     ----------
     path : str or path
@@ -63,8 +68,8 @@ def write(
         The arrays of the data set.
     format : str, optional
         The format, where the name does not say it.
-    dtype : "float32", "float16" or "float64" ("float32")
-        Type of the numbers; beside float16 spectra, labels stay float32.
+    dtype : "float32", "float16" or "float64", optional
+        Type of the numbers, the sampler's unless given; beside float16 spectra, labels stay float32.
     chunk : int, optional
         Draws in each chunk of a set; some 16 MiB unless given.
     zstd : True or a level from 1 to 22, optional
@@ -84,9 +89,16 @@ def write(
         True shows a bar of `tqdm`; None does where that is installed and standard error is a terminal. A function is called
         with the number of rows done and that of all.
 
+    Returns
+    -------
+    Written
+        The draws that this call made, the candidates that they took, and whether the data set is complete.
+
     Ctrl-C ends it with KeyboardInterrupt: a file leaves nothing behind, and a set can be resumed.
     """
     text = os.fspath(path)
+    if dtype is None and isinstance(source, Sampler):
+        dtype = source.dtype
     options = {
         "path": text,
         "is_folder": text.endswith(("/", os.sep)),

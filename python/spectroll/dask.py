@@ -141,7 +141,7 @@ def _axis(zarr_format: int) -> dict[str, Any]:
 
 
 def attributes(sampler: Sampler, indices: range, seed: int, stream: str | None) -> dict[str, Any]:
-    """Attributes from which the same draws can be made again."""
+    """The attributes of a store, from which the same draws can be made again: model, settings, seed, stream and start."""
     from ._spectroll import __version__
 
     return {

@@ -100,7 +100,7 @@ class IterableDraws(_Draws, IterableDataset):  # type: ignore[misc]
 
 
 def share() -> tuple[int, int]:
-    """Number of this worker among those of all ranks, and their number."""
+    """(i, n): the number of this worker among those of all ranks, from 0, and how many there are."""
     info = get_worker_info()
     worker, workers = (info.id, info.num_workers) if info is not None else (0, 1)
     distributed = getattr(torch, "distributed", None)

@@ -12,7 +12,9 @@ use pyo3::{PyErr, create_exception};
 use spectroll::export::{ExportError, SelectionError};
 use spectroll::output::OutputError;
 use spectroll::scene::SceneError;
-use spectroll::{DatasetError, FitError, GridError, ModelError, RecipeError, SamplerError, WgslError};
+use spectroll::{
+    DatasetError, FitError, GridError, ModelError, RecipeError, Remedy, SamplerError, WgslError,
+};
 
 create_exception!(
     spectroll,
@@ -75,7 +77,7 @@ macro_rules! values {
     };
 }
 
-values!(RecipeError, GridError, WgslError, SceneError, SelectionError, FitError, SamplerError);
+values!(RecipeError, GridError, WgslError, SceneError, SelectionError, SamplerError);
 
 impl From<spectroll::EngineError> for Error {
     fn from(error: spectroll::EngineError) -> Error {
@@ -87,8 +89,34 @@ impl From<DatasetError> for Error {
     fn from(error: DatasetError) -> Error {
         match &error {
             DatasetError::Read { source, .. } => os(source, &error),
-            _ => data(error),
+            _ => data(format!("{error}{}", argument(error.remedy()))),
         }
+    }
+}
+
+impl From<FitError> for Error {
+    fn from(error: FitError) -> Error {
+        match &error {
+            FitError::Unphysical(unphysical) => data(format!("{error}{}", argument(unphysical.remedy))),
+            FitError::NotReflectances { .. } => data(format!("{error}{}", argument(Remedy::Scale(0.01)))),
+            _ => value(error),
+        }
+    }
+}
+
+/// The argument that does what the message of an error about data advises.
+fn argument(remedy: Remedy) -> String {
+    match remedy {
+        Remedy::MissingValue(value) => format!(" (missing_values=[{value}], missing=\"drop\")"),
+        Remedy::Missing => " (at=, missing=\"drop\")".to_owned(),
+        Remedy::Scale(factor) => format!(" (scale={factor}, or kind=\"illuminant\")"),
+        Remedy::Unit(unit) => format!(" (unit=\"{unit}\")"),
+        Remedy::Layout => " (layout=\"columns\" or \"rows\")".to_owned(),
+        Remedy::Dialect => " (separator=, decimal=, skip=)".to_owned(),
+        Remedy::Decimal => " (decimal=\".\" or \",\")".to_owned(),
+        Remedy::MeasuredAt => " (wavelengths=)".to_owned(),
+        Remedy::Wavelengths => " (at=, extrapolate=)".to_owned(),
+        _ => String::new(),
     }
 }
 

@@ -39,6 +39,7 @@ mod _spectroll {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("BUILTIN", spectroll::Model::BUILTIN.to_vec())?;
+        module.add("TABLES", crate::data::builtin_tables())?;
         module.add("EXAMPLES", spectroll::scene::PRESETS.iter().map(|(name, _)| *name).collect::<Vec<_>>())
     }
 }

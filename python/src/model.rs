@@ -7,10 +7,9 @@ use pyo3::prelude::*;
 
 use spectroll::output::IfExists;
 use spectroll::suggestion::closest;
-use spectroll::{
-    Dataset, Extrapolation, Fit, Grid, Model as Fitted, ModelError, Normalization, SpectrumKind, Table,
-};
+use spectroll::{Dataset, Fit, Grid, Model as Fitted, ModelError, Normalization, SpectrumKind, Table};
 
+use crate::data::Onto;
 use crate::error::{self, Error, Result};
 
 /// A grid of wavelengths, as text (`400:10:700`) or as the wavelengths themselves.
@@ -64,7 +63,7 @@ impl Model {
         components: Option<usize>,
         explain: Option<f64>,
         normalize: Option<&str>,
-        extrapolate: &str,
+        onto: Onto,
     ) -> PyResult<Model> {
         let kind = self::kind(kind)?;
         let mut fit = Fit::new(kind);
@@ -77,10 +76,14 @@ impl Model {
         if let Some(name) = normalize {
             fit = fit.normalization(normalization(name)?);
         }
-        let extend = extrapolation(extrapolate)?;
+        let resampling = onto.resampling()?;
         let tables = tables.iter().map(table).collect::<Result<Vec<_>>>()?;
         let model = py.detach(|| -> Result<Fitted> {
-            let data = Dataset::new(&tables, grid.grid()?, extend)?;
+            let grid = match &grid {
+                Wavelengths::Text(text) if text == "as-measured" => Dataset::measured_grid(&tables)?,
+                grid => grid.grid()?,
+            };
+            let data = Dataset::new(&tables, grid, resampling)?;
             Ok(fit.fit(&data)?)
         })?;
         Ok(Model { model, name: String::new() })
@@ -208,11 +211,6 @@ fn normalization(name: &str) -> Result<Normalization> {
     let all =
         [("mean", Normalization::Mean), ("integral", Normalization::Integral), ("none", Normalization::None)];
     choice("normalize", name, &all)
-}
-
-pub(crate) fn extrapolation(name: &str) -> Result<Extrapolation> {
-    let all = [("error", Extrapolation::Error), ("hold", Extrapolation::Hold), ("zero", Extrapolation::Zero)];
-    choice("extrapolate", name, &all)
 }
 
 /// The value of a name among some, or a `ValueError` that lists them.

@@ -89,6 +89,58 @@ def test_fits_take_their_settings(csv):
     assert len(two.sources) == 2
 
 
+def test_files_are_read_with_the_settings_of_the_program(tmp_path):
+    grid = np.arange(400, 701, 50)
+    values = np.random.default_rng(3).uniform(0.2, 0.8, (5, 7)).round(3)
+    rows = ["\t".join(["id", *(f"{w / 1000:.2f}" for w in grid)])]
+    rows += ["\t".join([f"s{i}", *(f"{100 * v:.1f}".replace(".", ",") for v in row)]) for i, row in enumerate(values)]
+    text = "measured by nobody\n" + "\n".join(rows).replace("0.", "0,") + "\n"
+    path = tmp_path / "um.txt"
+    path.write_text(text)
+    with pytest.raises(spectroll.DataError, match=r'unit="um"'):
+        spectroll.read(path)
+    settings = {"unit": "um", "scale": 0.01, "layout": "rows", "separator": "\t", "decimal": ",", "skip": 1}
+    read = spectroll.read(path, **settings)
+    np.testing.assert_allclose(read, values, atol=1e-9)
+    np.testing.assert_allclose(read.wavelengths, grid)
+    assert any("skipped the first 1 line" in note for note in read.notes)
+
+    values[1, 2] = -999
+    path = tmp_path / "marked.csv"
+    np.savetxt(path, np.column_stack([grid, values.T]), delimiter=";")
+    with pytest.raises(spectroll.DataError, match=r"missing_values=\[-999\]"):
+        Model.fit(spectroll.read(path), kind="reflectance", components=2)
+    marked = spectroll.read(path, missing_values=-999)
+    assert np.isnan(marked.values[1, 2]) and np.isnan(marked).sum() == 1
+    with pytest.raises(spectroll.DataError, match="missing="):
+        Model.fit(marked, kind="reflectance", components=2)
+    dropped = Model.fit(marked, kind="reflectance", components=2, missing="drop")
+    whole = Model.fit(np.delete(values, 1, 0), grid, kind="reflectance", components=2)
+    np.testing.assert_array_equal(dropped.basis, whole.basis)
+    filled = marked.at("400:50:700", missing="interpolate")
+    assert 0 < filled.values[1, 2] < 1 and "filled" in filled.notes[-1]
+
+
+def test_tables_are_built_in():
+    assert {"munsell", "macbeth", "houser"} <= set(spectroll.tables())
+    lamps = spectroll.read("houser")
+    assert lamps.kind == "illuminant" and len(lamps) > 300
+    coarse = Model.fit(lamps, components=4, at="400:20:700")
+    assert coarse != Model.fit(lamps, components=4, at="400:20:700", resample="interpolate")
+
+
+def test_models_have_uneven_wavelengths():
+    bands = [443.0, 490.0, 560.0, 665.0]
+    model = Model.fit(spectroll.read("munsell"), kind="reflectance", components=2, at=bands)
+    sampler = Sampler(model, lrv=0.3, bounds="both", engine="cpu")
+    assert sampler.wavelengths.tolist() == bands == model.wavelengths.tolist()
+    drawn = sampler.draw(1000, seed=3, quantities=["spectra", "lrv"])
+    assert drawn["spectra"].shape == (1000, 4) and drawn["spectra"].min() > 0 and drawn["spectra"].max() < 1
+    again = Model.from_json(model.to_json())
+    assert Sampler(again, lrv=0.3, bounds="both", engine="cpu").draw(9, seed=3).tobytes() == drawn["spectra"][:9].tobytes()
+    assert Model.fit(spectroll.read("munsell"), kind="reflectance", components=2, at="as-measured").bands > 31
+
+
 def test_spectra_are_arrays(csv, tmp_path):
     read = spectroll.read(csv)
     assert np.mean(read, axis=0).shape == (7,) and read[1].tolist() == read.values[1].tolist()

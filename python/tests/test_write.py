@@ -233,3 +233,12 @@ def test_the_program_is_of_the_same_version(program):
 def test_the_program_starts_without_numpy():
     code = "import sys, spectroll._spectroll; assert 'numpy' not in sys.modules; import spectroll; spectroll.Model; assert 'numpy' in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_the_type_is_the_samplers_unless_another_is_asked_for(tmp_path):
+    halves = Sampler(dtype="float16", engine="cpu")
+    write(tmp_path / "halves.npy", halves, 100, seed=3)
+    written = np.load(tmp_path / "halves.npy")
+    assert written.dtype == np.float16 and written.tobytes() == halves.draw(100, seed=3).tobytes()
+    write(tmp_path / "floats.npy", halves, 100, seed=3, dtype="float32")
+    assert np.load(tmp_path / "floats.npy").dtype == np.float32

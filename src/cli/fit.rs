@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use spectroll::output::write_file;
+use spectroll::wording::counted;
 use spectroll::{
     Dataset, Extrapolation, Fit, Grid, Missing, Model, Normalization, ResampleMethod, Resampling,
     SpectraCounts, SpectrumKind, Table,
@@ -11,7 +12,6 @@ use spectroll::{
 use super::exit::Usage;
 use super::if_exists;
 use super::options::DataArguments;
-use super::parse::{counted, grouped};
 use super::run::Waiting;
 use super::wavelengths::{Wavelengths, wavelengths};
 
@@ -134,14 +134,14 @@ fn unusual(counts: SpectraCounts) {
 }
 
 fn report(model: &Model, data: &Dataset, path: &Path) {
+    let kind = model.kind().to_string();
     let explained: f64 = model.parts().explained_variance.iter().sum();
     tell!(
-        "{}: {} components explain {:.2} % of {} {}s at {} nm",
+        "{}: {} {:.2} % of {} at {} nm",
         path.display(),
-        model.components(),
+        counted(model.components() as u64, "component explains", "components explain"),
         100.0 * explained,
-        grouped(data.spectra().ncols() as u64),
-        model.kind(),
+        counted(data.spectra().ncols() as u64, &kind, &format!("{kind}s")),
         model.grid(),
     );
     for note in data.notes() {

@@ -7,13 +7,13 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use serde::Serialize;
+use spectroll::wording::{counted, grouped};
 use spectroll::{Dataset, DatasetError, Extrapolation, Grid, Reading, SpectrumKind};
 
 use super::exit;
 use super::exit::Usage;
 use super::inspect::line;
 use super::options::DataArguments;
-use super::parse::{counted, grouped};
 use super::wavelengths::grid;
 use super::{if_exists, picture};
 

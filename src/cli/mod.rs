@@ -123,6 +123,12 @@ pub fn main(words: Vec<OsString>) -> u8 {
     }
 }
 
+/// Whether the words of a command line, with the configuration that they may name, say what is to be done. Nothing is.
+pub fn understands(words: Vec<OsString>) -> bool {
+    let words = options::config::expand(&Arguments::command(), words);
+    words.is_ok_and(|words| Arguments::try_parse_from(words).is_ok())
+}
+
 fn run(command: Command) -> anyhow::Result<()> {
     match &command {
         Command::Fit(arguments) => fit::run(arguments),

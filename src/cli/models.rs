@@ -3,9 +3,8 @@
 use std::io::Write;
 
 use serde::Serialize;
+use spectroll::wording::grouped;
 use spectroll::{BuiltinData, Model, SpectrumKind};
-
-use super::parse::grouped;
 
 /// List the built-in models
 ///

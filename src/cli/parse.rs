@@ -2,7 +2,6 @@
 
 use std::num::NonZeroUsize;
 
-use indicatif::HumanCount;
 use spectroll::output::ByteCount;
 
 /// A number of threads: more than any machine has cores would only take long to start.
@@ -70,16 +69,6 @@ pub(super) fn seed(text: &str) -> Result<u64, String> {
     }
 }
 
-/// A number of things by their names: "1 spectrum", "2,000 spectra".
-pub(super) fn counted(n: u64, one: &str, several: &str) -> String {
-    format!("{} {}", grouped(n), if n == 1 { one } else { several })
-}
-
-/// A number with its thousands set apart.
-pub(super) fn grouped(n: u64) -> String {
-    HumanCount(n).to_string()
-}
-
 /// Bytes in the unit that suits them.
 pub(super) fn size(bytes: u64) -> String {
     ByteCount(bytes).to_string()
@@ -129,13 +118,6 @@ mod tests {
                 "{text}"
             );
         }
-    }
-
-    #[test]
-    fn one_is_no_plural() {
-        assert_eq!(counted(1, "spectrum", "spectra"), "1 spectrum");
-        assert_eq!(counted(0, "spectrum", "spectra"), "0 spectra");
-        assert_eq!(counted(2000, "spectrum", "spectra"), "2,000 spectra");
     }
 
     #[test]

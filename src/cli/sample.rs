@@ -7,11 +7,12 @@ use std::time::Instant;
 use serde::Serialize;
 use spectroll::export::{DrawExport, Output, Writing};
 use spectroll::output::SetStatus;
+use spectroll::wording::counted;
 use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Model, Stream, wanted_backends};
 
 use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, Purpose, RecipeArguments};
-use super::parse::{count, counted, seed};
+use super::parse::{count, seed};
 use super::run::{self, DryRun, Waiting};
 use super::wavelengths::grid;
 use super::{interrupt, model_at};

@@ -11,12 +11,13 @@ use spectroll::export::{ArraySelection, Companions, ExportError, Output, SceneEx
 use spectroll::output::{OutputError, PendingFile, Schema, SetStatus};
 use spectroll::plain_file::read_text;
 use spectroll::scene::{GroupSummary, MAX_FILE_BYTES, PRESETS, Scene, Workload};
+use spectroll::wording::{counted, grouped};
 use spectroll::{Dtype, Engine, Quantity};
 
 use super::exit::Usage;
 use super::interrupt;
 use super::options::{EngineArguments, OutputArguments, Purpose};
-use super::parse::{counted, grouped, seed, size};
+use super::parse::{seed, size};
 use super::picture;
 use super::picture::scene::Preview;
 use super::run::{self, Waiting, folder_of};

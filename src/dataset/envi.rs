@@ -7,6 +7,7 @@ use super::arrays::{Array, Arrays, Order};
 use super::numbers::{Number, NumberKind};
 use super::units::WavelengthUnit;
 use super::{DatasetError, MAX_VALUES, files, text, too_many};
+use crate::wording::counted;
 
 /// Largest header.
 const MAX_HEADER: u64 = 64 << 20;
@@ -103,9 +104,11 @@ pub(super) fn arrays(path: &Path, header: &Header) -> Result<Arrays, DatasetErro
     let numbers = size.and_then(|size| data.get(offset..offset.checked_add(size)?));
     let Some(numbers) = numbers else {
         return Err(wrong(format!(
-            "its header promises {spectra} spectra of {bands} bands, and {:?} has {} bytes",
+            "its header promises {} of {}, and {:?} has {}",
+            counted(spectra as u64, "spectrum", "spectra"),
+            counted(bands as u64, "band", "bands"),
             header.data,
-            data.len()
+            counted(data.len() as u64, "byte", "bytes")
         )));
     };
     if count.is_some_and(|count| count > MAX_VALUES) {
@@ -124,7 +127,8 @@ pub(super) fn arrays(path: &Path, header: &Header) -> Result<Arrays, DatasetErro
     if let Some(ignored) = entry("data ignore value").and_then(|text| text.parse::<f64>().ok()) {
         let gone =
             values.iter_mut().filter(|value| **value == ignored).map(|value| *value = f64::NAN).count();
-        notes.push(format!("{gone} values are missing by the data ignore value, {ignored}"));
+        let gone = counted(gone as u64, "value is", "values are");
+        notes.push(format!("{gone} missing by the data ignore value, {ignored}"));
     }
     let mut found = Arrays {
         format: "ENVI spectral library".to_owned(),

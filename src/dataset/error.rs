@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::MAX_BYTES;
 use super::units::WavelengthUnit;
 use crate::grid::{Grid, GridError};
+use crate::wording::counted;
 
 /// Setting of a reader or a fit that the message of an error advises.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +53,8 @@ pub enum DatasetError {
     #[error("{path:?}: {reason}")]
     Layout { path: PathBuf, reason: String, remedy: Remedy },
     #[error(
-        "{path:?} does not say at which wavelengths its {bands} bands are: give them, as start:step:stop"
+        "{path:?} does not say at which wavelengths its {}: give them, as start:step:stop",
+        counted(*bands as u64, "band is", "bands are")
     )]
     NoWavelengths { path: PathBuf, bands: usize },
     #[error(
@@ -68,7 +70,9 @@ pub enum DatasetError {
     #[error("{name}: {reason}")]
     NotWavelengths { name: String, reason: String, remedy: Remedy },
     #[error(
-        "{name}: {values} values in spectrum {spectrum}, but {wavelengths} wavelengths: give one value for each"
+        "{name}: {} in spectrum {spectrum}, but {}: give one value for each",
+        counted(*values as u64, "value", "values"),
+        counted(*wavelengths as u64, "wavelength", "wavelengths")
     )]
     Length { name: String, spectrum: usize, values: usize, wavelengths: usize },
     #[error(

@@ -13,6 +13,7 @@ use hdf5_pure::{AttrValue, Dataset, Error, File, Group};
 use super::arrays::{self, Array, Arrays, Order};
 use super::units::WavelengthUnit;
 use super::{DatasetError, MAX_VALUES};
+use crate::wording::counted;
 
 /// Deepest group that is looked into.
 const MAX_DEPTH: usize = 6;
@@ -144,8 +145,8 @@ impl Walk {
         let mut values = set.read_f64().map_err(placed)?;
         if values.len() as u64 != count {
             return Err(Fault::Other(format!(
-                "{name:?} holds {} values, not {count}; copy it again",
-                values.len()
+                "{name:?} holds {}, not {count}; copy it again",
+                counted(values.len() as u64, "value", "values")
             )));
         }
         self.packing(&name, &attributes, &mut values);
@@ -188,7 +189,8 @@ impl Walk {
         };
         let gone = values.iter_mut().filter(|value| is_out(**value)).map(|value| *value = f64::NAN).count();
         if gone > 0 {
-            said.push(format!("{gone} values are missing by _FillValue, missing_value or valid_range"));
+            let gone = counted(gone as u64, "value is", "values are");
+            said.push(format!("{gone} missing by _FillValue, missing_value or valid_range"));
         }
         let (factor, offset) = (first("scale_factor"), first("add_offset"));
         if factor.is_some() || offset.is_some() {

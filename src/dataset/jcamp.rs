@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use super::reading::{ReadOptions, Reading};
 use super::units::WavelengthUnit;
 use super::{DatasetError, Table};
+use crate::wording::counted;
 
 /// Reads the first block of data.
 pub(super) fn read(path: &Path, text: &str, options: &ReadOptions) -> Result<Reading, DatasetError> {
@@ -102,7 +103,11 @@ fn steps(
         return Err("it has no ##FIRSTX and ##LASTX".to_owned());
     };
     if count.is_some_and(|count| count != values.len() as f64) || values.len() < 2 {
-        return Err(format!("{} values where ##NPOINTS says {}", values.len(), count.unwrap_or(f64::NAN)));
+        return Err(format!(
+            "{} where ##NPOINTS says {}",
+            counted(values.len() as u64, "value", "values"),
+            count.unwrap_or(f64::NAN)
+        ));
     }
     let step = (last - first) / (values.len() - 1) as f64;
     let x: Vec<f64> = (0..values.len()).map(|i| first + step * i as f64).collect();

@@ -39,6 +39,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::grid::Grid;
+use crate::wording::counted;
 pub use builtin::BuiltinTable;
 pub use error::{DatasetError, Remedy};
 pub use judge::{SpectraCounts, Unphysical};
@@ -134,8 +135,10 @@ impl Dataset {
         let count = resampled.iter().map(|of| of.numbers.len()).sum();
         let values = resampled.iter().flat_map(|of| of.spectra.iter().copied());
         let spectra = DMatrix::from_iterator(grid.len(), count, values);
-        let source =
-            |(table, of): (&Table, &Resampled)| format!("{} ({} spectra)", table.source, of.numbers.len());
+        let source = |(table, of): (&Table, &Resampled)| {
+            let count = counted(of.numbers.len() as u64, "spectrum", "spectra");
+            format!("{} ({count})", table.source)
+        };
         let sources = tables.iter().zip(&resampled).map(source).collect();
         let notes = resampled.iter().flat_map(|of| of.notes.iter().cloned()).collect();
         let numbers = resampled.into_iter().map(|of| of.numbers).collect();

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use super::reading::{ReadOptions, Reading};
 use super::{DatasetError, Remedy, SpectrumKind, axis, format};
 use crate::grid::{self, Grid};
+use crate::wording::counted;
 
 /// Spectra of one source, as measured: increasing wavelengths (nm), and values that are finite or NaN, which means "not
 /// measured".
@@ -126,7 +127,8 @@ impl Table {
             }
         }
         if !options.missing_values.is_empty() {
-            reading.notes.push(format!("{marked} values were marked as missing, as asked for"));
+            let marked = counted(marked, "value", "values");
+            reading.notes.push(format!("marked {marked} as missing, as asked for"));
         }
         Ok(reading)
     }

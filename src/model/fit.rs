@@ -7,6 +7,7 @@ use super::decomposition::Decomposition;
 use crate::dataset::{Dataset, SpectrumKind, Unphysical};
 use crate::grid::Grid;
 use crate::model::{MAX_COMPONENTS, Model, ModelParts, Normalization};
+use crate::wording::counted;
 
 /// Settings of a fit.
 ///
@@ -42,7 +43,11 @@ pub enum FitError {
     Components(usize),
     #[error("a share of the variance of {0}: it must be above 0 and at most 1")]
     Share(f64),
-    #[error("{components} components need at least {} spectra, and there are {spectra}: ask for fewer", components + 1)]
+    #[error(
+        "a fit of {} takes at least {} spectra, and the data have {spectra}: ask for fewer",
+        counted(*components as u64, "component", "components"),
+        components + 1
+    )]
     TooFewSpectra { components: usize, spectra: usize },
     #[error("all {spectra} spectra are identical: there is no variation to model")]
     NoVariation { spectra: usize },

@@ -18,6 +18,7 @@ pub use fit::{Fit, FitError};
 use crate::dataset::{SpectrumKind, Table};
 use crate::grid::{Grid, GridError};
 use crate::plain_file;
+use crate::wording::counted;
 
 /// The most components a model may have: what the counter layout of a draw has blocks for (see
 /// [`Stream::block`](crate::Stream::block)).
@@ -93,12 +94,13 @@ pub enum ModelError {
     Invalid { path: String, source: Box<ModelError> },
     #[error("the wavelengths are not a grid: {0}")]
     Grid(#[from] GridError),
-    #[error("{field} has {found} values where the rest of the model needs {expected}")]
+    #[error("{field} has {} where the rest of the model needs {expected}", counted(*found as u64, "value", "values"))]
     Shape { field: &'static str, found: usize, expected: usize },
     #[error("{field} holds {value}; every value must be finite")]
     NotFinite { field: &'static str, value: f64 },
     #[error(
-        "a model has 1 to {MAX_COMPONENTS} components, and no more than bands; this one has {components} for {bands} bands"
+        "a model has 1 to {MAX_COMPONENTS} components, and no more than bands; this one has {components} for {}",
+        counted(*bands as u64, "band", "bands")
     )]
     Components { components: usize, bands: usize },
     #[error(

@@ -4,6 +4,7 @@ use super::pilot::{PILOT, TOLERABLE_FAILURE, failure};
 use crate::cover::MOST_COMPONENTS;
 use crate::grid::Grid;
 use crate::quantity::Quantity;
+use crate::wording::counted;
 
 /// Error returned by [`RecipeBuilder::build`](crate::RecipeBuilder::build).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -60,7 +61,11 @@ pub enum RecipeError {
     Quantity { quantity: Quantity, reason: &'static str },
     #[error("nothing is asked for: a recipe has at least one quantity")]
     Nothing,
-    #[error("an illuminant of {found} values where the model has {expected} bands")]
+    #[error(
+        "an illuminant of {} where the model has {}",
+        counted(*found as u64, "value", "values"),
+        counted(*expected as u64, "band", "bands")
+    )]
     Light { found: usize, expected: usize },
     #[error(
         "the illuminant that surfaces are seen under has no luminance, or a value that is negative or not finite"

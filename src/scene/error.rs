@@ -7,6 +7,7 @@ use crate::grid::{Grid, GridError};
 use crate::model::ModelError;
 use crate::quantity::Quantity;
 use crate::recipe::RecipeError;
+use crate::wording::counted;
 
 use super::group::QUANTITIES;
 
@@ -89,7 +90,11 @@ pub enum SceneErrorKind {
     Mean(DatasetError),
     #[error("{found} spectra, and a mean is one: leave the others out of the table")]
     Means { found: usize },
-    #[error("{found} values where the model has {expected} bands: give one a band")]
+    #[error(
+        "{} where the model has {}: give one a band",
+        counted(*found as u64, "value", "values"),
+        counted(*expected as u64, "band", "bands")
+    )]
     MeanLength { found: usize, expected: usize },
     #[error("its mean power is {0}, and must be above 0: give the spectrum of a light")]
     DarkMean(f64),

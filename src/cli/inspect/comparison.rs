@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use spectroll::evaluation::comparison::{Comparison, ComparisonFigures, Moments};
+use spectroll::wording::grouped;
 use spectroll::{Dataset, Extrapolation, Model, Recipe, SpectrumKind, Stream, Table};
 
 use crate::cli::exit::Usage;
 use crate::cli::options::DataArguments;
-use crate::cli::parse::grouped;
 
 /// Number of draws that are compared with the data.
 const DRAWS: u64 = 20_000;

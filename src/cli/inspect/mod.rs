@@ -10,13 +10,14 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 use spectroll::evaluation::comparison::ComparisonFigures;
+use spectroll::wording::{grouped, wrapped};
 use spectroll::{Bounds, CoverSize, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind};
 
 mod comparison;
 
 use self::comparison::Compared;
 use super::options::RecipeArguments;
-use super::parse::{grouped, number};
+use super::parse::number;
 use super::wavelengths::grid;
 use super::{if_exists, picture};
 
@@ -213,27 +214,6 @@ pub(super) fn line(text: &mut String, label: &str, value: &str) {
     }
 }
 
-/// The words of `text` in lines of at most `width` characters, where no word is longer.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    let mut used = 0;
-    for word in text.split_whitespace() {
-        let length = word.chars().count();
-        if used > 0 && used + 1 + length > width {
-            lines.push(String::new());
-            used = 0;
-        }
-        let last = lines.len() - 1;
-        if used > 0 {
-            lines[last].push(' ');
-            used += 1;
-        }
-        lines[last].push_str(word);
-        used += length;
-    }
-    lines
-}
-
 fn normalization(normalization: Normalization) -> &'static str {
     match normalization {
         Normalization::Mean => "each spectrum divided by its mean power",
@@ -342,12 +322,5 @@ mod tests {
             assert_eq!(rows, 2 + model.components(), "{table}");
             assert!(!table.contains("-0.0000"), "{table}");
         }
-    }
-
-    #[test]
-    fn long_text_is_wrapped_between_words() {
-        assert_eq!(wrapped("a bc  def", 4), ["a bc", "def"]);
-        assert_eq!(wrapped("", 4), [""]);
-        assert_eq!(wrapped("abcdef", 4), ["abcdef"]);
     }
 }

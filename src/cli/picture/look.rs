@@ -3,10 +3,11 @@
 use kuva::prelude::{LinePlot, Plot};
 use kuva::render::render::Scene;
 use spectroll::evaluation::plot::{self, Caption, Theme};
+use spectroll::wording::wrapped;
 use spectroll::{Dataset, SpectrumKind, Table};
 
 use super::colours::Colours;
-use super::panel::{self, Axes, MARGINS, Panel, curve};
+use super::panel::{self, Axes, MARGINS, Panel, curve, place};
 
 /// The most spectra that are shown: beyond these they hide each other.
 const MAX_SHOWN: usize = 400;
@@ -32,6 +33,9 @@ impl Picture<'_> {
     /// The picture, drawn.
     pub(in crate::cli) fn drawing(&self) -> Scene {
         let mut drawing = panel::arrange([self.measured(), self.on_grid()], self.theme);
+        if let Err(reason) = self.gridded {
+            drawing.elements.extend(place(1).paragraph(&wrapped(reason, 50), self.theme));
+        }
         plot::head(&mut drawing, &super::title(self.name), self.note, self.theme);
         drawing
     }
@@ -121,17 +125,9 @@ impl Picture<'_> {
     fn on_grid(&self) -> Panel {
         let data = match self.gridded {
             Ok(data) => data,
-            Err(reason) => {
-                let (words, mut note) = (reason.split_whitespace(), String::new());
-                words
-                    .take_while(|word| {
-                        note += word;
-                        note.push(' ');
-                        note.len() < 60
-                    })
-                    .count();
-                let layout = self.theme.axes((0.0, 1.0), (0.0, 1.0), MARGINS).with_x_label("wavelength (nm)");
-                let caption = Caption { title: "Not on the grid".to_owned(), note, vertical: self.label() };
+            Err(_) => {
+                let layout = self.theme.axes((0.0, 1.0), (0.0, 1.0), MARGINS);
+                let caption = Caption { title: "No model can be fitted".to_owned(), ..Caption::default() };
                 return (vec![LinePlot::new().into()], layout, caption);
             }
         };

@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use spectroll::export::{Companions, Destination, Output, Space};
 use spectroll::output::{ByteCount, Field, FileFormat, Schema};
+use spectroll::wording::counted;
 use spectroll::{Engine, Recipe, Stream};
 
 use super::{part, room};
-use crate::cli::parse::counted;
 
 /// Duration of the trial of drawing.
 const TRIAL: Duration = Duration::from_millis(300);

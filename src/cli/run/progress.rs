@@ -6,8 +6,7 @@ use std::io::{self, IsTerminal};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
-
-use crate::cli::parse::grouped;
+use spectroll::wording::grouped;
 
 /// Time between lines where there is no terminal.
 const LINES: Duration = Duration::from_secs(10);

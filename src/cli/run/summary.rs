@@ -3,10 +3,10 @@
 use spectroll::Model;
 use spectroll::export::{Destination, Output, Space};
 use spectroll::output::{ByteCount, Schema, SetStatus, Shard};
+use spectroll::wording::{counted, grouped};
 
 use super::folder_of;
 use crate::cli::folder;
-use crate::cli::parse::{counted, grouped};
 
 /// Names what was made, before the number of rows, where the name does not say it.
 pub(in crate::cli) fn kind(output: &Output, files: Option<u64>) -> String {

@@ -11,11 +11,11 @@ use rand::Rng;
 use spectroll::Stream;
 use spectroll::export::Destination;
 use spectroll::output::{Fault, Piece, SetAudit, Sidecar, merge};
+use spectroll::wording::{counted, grouped};
 
 use super::exit::{Unverified, Usage};
 use super::interrupt;
 use super::options::EngineArguments;
-use super::parse::{counted, grouped};
 use sources::{Request, chunk};
 
 /// Check a .zarr, a folder of parts or a file with a sidecar against its sums, and draw some of it again

@@ -167,13 +167,13 @@ impl Column {
             .filter(|&row| !sheet.row(row).is_comment && sheet.row(row).cells + 1 < extent.width)
             .count();
         if above > 0 {
-            notes.push(format!("{above} {}s above the table are not part of it", sheet.row_name));
+            notes.push(format!("left out {} above the table", sheet.counted(above)));
         }
         let below = sheet.rows[last + 1..].iter().filter(|row| !row.is_comment).count();
         if below > 0 {
             notes.push(format!(
-                "{below} {}s below the table, from {} on, are not part of it ({})",
-                sheet.row_name,
+                "left out {} below the table, from {} on ({})",
+                sheet.counted(below),
                 sheet.line(last + 1),
                 sheet.shown(last + 1)
             ));

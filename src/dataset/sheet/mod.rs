@@ -16,6 +16,7 @@ pub(super) use layout::lay_out;
 use super::error::Remedy;
 use super::units::WavelengthUnit;
 use super::{DatasetError, MAX_BYTES};
+use crate::wording::counted;
 
 /// Largest number of cells: their values take as many bytes as the largest file.
 const MAX_CELLS: usize = MAX_BYTES as usize / size_of::<f64>();
@@ -181,6 +182,11 @@ impl Sheet {
 
     fn line(&self, row: usize) -> String {
         format!("{} {}", self.row_name, self.rows[row].line)
+    }
+
+    /// A number of rows, by their name.
+    pub(super) fn counted(&self, rows: usize) -> String {
+        counted(rows as u64, self.row_name, &format!("{}s", self.row_name))
     }
 
     /// A row as a message shows it.

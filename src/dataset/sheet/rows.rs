@@ -9,6 +9,7 @@ use crate::dataset::axis::{self, AxisFault};
 use crate::dataset::error::Remedy;
 use crate::dataset::reading::{Decimal, ReadOptions};
 use crate::dataset::units::{WavelengthUnit, is_wavelength_word};
+use crate::wording::counted;
 
 /// Number of rows at the top of a table among which its heading is looked for.
 const ROWS: usize = 100;
@@ -140,7 +141,7 @@ impl Heading {
         let mut notes = Vec::new();
         let above = (0..self.row).filter(|&row| !sheet.row(row).is_comment).count();
         if above > 0 {
-            notes.push(format!("{above} {}s above the heading are not part of the table", sheet.row_name));
+            notes.push(format!("left out {} above the heading", sheet.counted(above)));
         }
         for (side, others) in [("before", 0..columns.start), ("after", columns.end..extent.width)] {
             if !others.is_empty() {
@@ -151,8 +152,8 @@ impl Heading {
                     .take(6)
                     .collect();
                 notes.push(format!(
-                    "{} columns {side} the wavelengths are no part of the spectra ({})",
-                    others.len(),
+                    "left out {} {side} the wavelengths ({})",
+                    counted(others.len() as u64, "column", "columns"),
                     names.join(", ")
                 ));
             }
@@ -169,7 +170,7 @@ impl Heading {
                 true => return Err(misfit(sheet, extent, row, self.start)),
                 false => {
                     notes.push(format!(
-                        "{} and all below it is not part of the table ({})",
+                        "left out {} and all below it ({})",
                         sheet.line(row),
                         sheet.shown(row)
                     ));

@@ -10,6 +10,7 @@ use super::reading::{ReadOptions, Reading};
 use super::sheet::{self, lay_out};
 use super::units::WavelengthUnit;
 use super::{DatasetError, Table};
+use crate::wording::counted;
 
 pub(super) use decode::decode;
 pub(super) use dialect::{Dialect, cells};
@@ -39,7 +40,10 @@ pub(super) fn read_text(
         notes.insert(0, format!("the lines above the table state the unit of the wavelengths: {unit}"));
     }
     if options.skip > 0 {
-        notes.insert(0, format!("the first {} lines were skipped, as asked for", options.skip));
+        notes.insert(
+            0,
+            format!("skipped the first {}, as asked for", counted(options.skip as u64, "line", "lines")),
+        );
     }
     let table = Table::from_measured(&format!("{path:?}"), laid.wavelengths, laid.spectra, &mut notes)?;
     Ok(Reading {

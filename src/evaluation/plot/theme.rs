@@ -128,6 +128,18 @@ pub struct Place {
     pub margins: [f64; 4],
 }
 
+impl Place {
+    /// Sentences within the axes, for a panel that has nothing to show and a reason for it.
+    pub fn paragraph(&self, lines: &[String], theme: Theme) -> Vec<Primitive> {
+        let Place { corner: (x, y), margins: [left, _, top, _], .. } = *self;
+        let line = |(row, line): (usize, &String)| {
+            let at = (x + left + 14.0, y + top + 26.0 + 18.0 * row as f64);
+            text(at, LABEL_SIZE, line, TextAnchor::Start, theme.ink())
+        };
+        lines.iter().enumerate().map(line).collect()
+    }
+}
+
 /// Text around the axes of a panel: a title, a note below it, and the name of the vertical axis. The plot library
 /// centres titles and has no notes, and sets names of vertical axes at a distance that differs from panel to panel.
 #[derive(Clone, Debug, Default)]

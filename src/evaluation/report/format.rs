@@ -2,13 +2,6 @@
 
 use super::chart::superscript;
 
-/// Formats a number with its thousands set apart.
-pub(super) fn grouped(n: u64) -> String {
-    let digits = n.to_string();
-    let groups: Vec<_> = digits.as_bytes().rchunks(3).rev().map(|g| String::from_utf8_lossy(g)).collect();
-    groups.join(",")
-}
-
 /// Formats a number to two digits, with a power of ten where it needs one.
 pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
@@ -68,7 +61,6 @@ mod tests {
                 "1.0 × 10⁻³⁰⁰"
             ]
         );
-        assert_eq!(grouped(1_234_567), "1,234,567");
         assert_eq!([3.0, 61.2, 130.0].map(duration), ["3.0 s", "61 s", "2 min"]);
         assert_eq!(file_stem("a/my model.json"), "my-model");
     }

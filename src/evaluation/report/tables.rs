@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::figures::times_text;
-use super::format::{duration, grouped, number};
+use super::format::{duration, number};
 use super::page::{escape, powers};
 use super::{
     Accuracy, CheckRow, Convergence, DataComparison, Errors, Fidelity, Quartiles, Randomness, Report, Stop,
@@ -12,6 +12,7 @@ use super::{
 use crate::dataset::SpectrumKind;
 use crate::evaluation::stress::Outcome;
 use crate::random::normal::radius;
+use crate::wording::grouped;
 
 /// Writes a table. The first `texts` columns are text.
 fn table(caption: &str, head: &[&str], texts: usize, rows: impl IntoIterator<Item = Vec<String>>) -> String {

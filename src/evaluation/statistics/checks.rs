@@ -401,3 +401,69 @@ pub fn smallest_errors(sample: &Sample) -> Smallest {
         independence: (sigmas((k + 1) * (k + 1)) + power) / n.sqrt(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::statistics::{Scenario, oracle};
+
+    /// The budget of false alarms, won back from each threshold.
+    #[test]
+    fn thresholds_spend_the_budget() {
+        for comparisons in [1, 7, 500] {
+            let spent = |p: f64| p * comparisons as f64 * RUNS as f64 / FALSE_ALARMS;
+            assert!((spent(two_sided(sigmas(comparisons))) - 1.0).abs() < 1e-6);
+            assert!((spent(2.0 * (-2.0 * supremum(comparisons).powi(2)).exp()) - 1.0).abs() < 1e-9);
+        }
+        let alarm =
+            |p: f64| Finding { p_values: vec![0.5, p], worst: "the second".to_owned(), fault: None }.alarm();
+        let limit = FALSE_ALARMS / RUNS as f64 / 2.0;
+        assert_eq!((alarm(1.01 * limit), alarm(0.99 * limit)), (None, Some("the second".to_owned())));
+    }
+
+    /// Three draws, by hand.
+    #[test]
+    fn covariances_are_those_of_the_formula() {
+        let scenario = Scenario::named("untruncated");
+        let sample = |a: &[f64], b: &[f64]| Sample {
+            weights: vec![a.to_vec(), b.to_vec()],
+            ..oracle(&scenario, 1, a.len() as u64)
+        };
+        let (one, other) = (sample(&[1.0, 2.0, 6.0], &[2.0, 0.0, 1.0]), sample(&[1.0; 3], &[1.0, 2.0, 3.0]));
+        // Deviations -2, -1, 3 and 1, -1, 0: products -2, 1, 0 with the mean -1/3 and the variance 14/9. The other sample's
+        // are 0.
+        let expected = two_sided((1.0 / 3.0) / (14.0f64 / 9.0 / 3.0).sqrt());
+        let found = Check::named("covariance").run(&one, &other);
+        assert!((found.p_values[1] - expected).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn known_draws_are_compared_to_their_tolerance() {
+        let scenario = Scenario::named("untruncated");
+        let library = oracle(&scenario, 1, 8);
+        let fault = |change: fn(&mut Sample)| {
+            let mut sample = library.clone();
+            change(&mut sample);
+            known_draws(&sample, &library).fault
+        };
+        assert_eq!(fault(|s| s.bands[3][5] += 0.9e-4), None);
+        assert!(fault(|s| s.bands[3][5] -= 1.1e-4).is_some_and(|fault| fault.starts_with("draw 5")));
+        // One draw may be another, whatever its values; two may not.
+        let flip = |s: &mut Sample, i: usize| {
+            s.attempts[i] += 1.0;
+            s.bands[0][i] += 0.5;
+        };
+        assert_eq!(fault(|s| s.attempts[2] += 1.0), None);
+        let mut sample = library.clone();
+        flip(&mut sample, 2);
+        assert_eq!(known_draws(&sample, &library).fault, None);
+        flip(&mut sample, 6);
+        assert!(known_draws(&sample, &library).fault.is_some_and(|fault| fault.starts_with("2 draws")));
+    }
+
+    /// A number that is no multiple of the draws that share a generator.
+    #[test]
+    fn samples_have_as_many_draws_as_asked_for() {
+        assert_eq!(oracle(&Scenario::named("untruncated"), 1, 1500).len(), 1500);
+    }
+}

@@ -8,7 +8,7 @@ use super::super::OutputError;
 use super::super::pending::{place, sync_folder};
 use super::super::schema::SharedArray;
 use super::super::sum::Sum;
-use super::Part;
+use super::layout::Part;
 use super::manifest::{Manifest, SEALED, SetPlan};
 
 /// A set that is being checked, complete or not.

@@ -4,7 +4,7 @@ use std::io;
 
 use super::super::npy;
 use super::super::schema::{Field, Schema, SharedArray};
-use super::Part;
+use super::layout::Part;
 
 /// Name of the `.npy` file of a field in a chunk.
 pub(super) fn npy_name(field: &Field, index: u64) -> String {

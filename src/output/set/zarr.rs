@@ -10,7 +10,7 @@ use std::io;
 use serde_json::{Map, Value, json};
 
 use super::super::schema::{Field, Schema, SharedArray};
-use super::Part;
+use super::layout::Part;
 
 /// Level at which Zstandard compresses chunks; `None` where it does not.
 pub(super) type Level = Option<i32>;

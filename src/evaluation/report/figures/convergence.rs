@@ -1,9 +1,10 @@
 //! Figures of the error against run time.
 
 use super::super::chart::{Axis, COLOURS, Chart, GUIDE, Series, Style};
-use super::super::format::{grouped, number};
+use super::super::format::number;
 use super::super::{Convergence, Curve, Point, Section, Source};
 use super::{Drawing, Figure};
+use crate::wording::grouped;
 
 /// Quantities whose errors are plotted.
 const QUANTITIES: [(&str, &str); 3] =

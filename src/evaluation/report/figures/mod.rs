@@ -5,8 +5,9 @@ mod convergence;
 pub(super) use convergence::times_text;
 
 use super::chart::{Axis, COLOURS, Chart, GUIDE, Series, Style};
-use super::format::{file_stem, grouped};
+use super::format::file_stem;
 use super::{Accuracy, Difficult, Difficulty, Fidelity, ModelReport, Randomness, Report, Section};
+use crate::wording::grouped;
 
 /// Figure of a report.
 #[derive(Clone, Debug)]
