@@ -2,6 +2,8 @@
 #![forbid(unsafe_code)]
 
 // In the order in which the data pass through them: a room imports only from those above it.
+#[doc(hidden)]
+pub mod caught;
 mod grid;
 #[doc(hidden)]
 pub mod plain_file;

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     quiet_drivers();
+    spectroll::caught::silence();
     ExitCode::from(spectroll::cli::main(std::env::args_os().collect()))
 }
 

@@ -37,6 +37,7 @@ mod _spectroll {
     /// Adds the constants.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        spectroll::caught::silence();
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("BUILTIN", spectroll::Model::BUILTIN.to_vec())?;
         module.add("TABLES", crate::data::builtin_tables())?;

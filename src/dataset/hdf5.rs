@@ -5,7 +5,6 @@
 //! parser's panics, should it have any left, end as errors.
 
 use std::collections::HashMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use hdf5_pure::{AttrValue, Dataset, Error, File, Group};
@@ -13,6 +12,7 @@ use hdf5_pure::{AttrValue, Dataset, Error, File, Group};
 use super::arrays::{self, Array, Arrays, Order};
 use super::units::WavelengthUnit;
 use super::{DatasetError, MAX_VALUES};
+use crate::caught::caught;
 use crate::wording::counted;
 
 /// Deepest group that is looked into.
@@ -26,7 +26,6 @@ const MAX_RATIO: u64 = 1100;
 
 pub(super) fn arrays(path: &Path, bytes: Vec<u8>) -> Result<Arrays, DatasetError> {
     let failed = |reason: String| DatasetError::Format { path: path.to_owned(), format: "HDF5", reason };
-    // The message of a panic is not for whoever reads a damaged file.
     let read = caught(|| read(bytes));
     match read {
         Some(Ok(arrays)) => Ok(arrays),
@@ -34,11 +33,6 @@ pub(super) fn arrays(path: &Path, bytes: Vec<u8>) -> Result<Arrays, DatasetError
         Some(Err(Fault::Other(reason))) => Err(failed(reason)),
         None => Err(failed("it is damaged; copy it again".to_owned())),
     }
-}
-
-/// Runs what may panic; `None` where it did.
-fn caught<T>(run: impl FnOnce() -> T) -> Option<T> {
-    catch_unwind(AssertUnwindSafe(run)).ok()
 }
 
 /// Error of a read.

@@ -1,7 +1,6 @@
 //! Parquet: columns of lists, which are spectra with their wavelengths in the file's notes, or columns of numbers, which
 //! are named by wavelengths or stand beside a column of them.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use bytes::Bytes;
@@ -15,6 +14,7 @@ use super::arrays::{self, Array, Arrays, Order};
 use super::reading::{Decimal, ReadOptions, Reading};
 use super::sheet::{Cell, Sheet};
 use super::{DatasetError, MAX_BYTES, MAX_VALUES, text};
+use crate::caught::caught;
 
 /// Records that are read at a time.
 const BATCH: usize = 1 << 16;
@@ -45,8 +45,8 @@ impl Columns {
         let failed =
             |reason: String| DatasetError::Format { path: path.to_owned(), format: "Parquet", reason };
         let taken = std::mem::take(self);
-        let read = catch_unwind(AssertUnwindSafe(|| taken.with(bytes)));
-        *self = read.map_err(|_| failed("it is damaged; copy it again".to_owned()))?.map_err(failed)?;
+        let read = caught(|| taken.with(bytes));
+        *self = read.ok_or_else(|| failed("it is damaged; copy it again".to_owned()))?.map_err(failed)?;
         Ok(())
     }
 

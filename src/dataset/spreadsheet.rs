@@ -1,7 +1,6 @@
 //! Spreadsheets: the first sheet that holds a table of numbers.
 
 use std::io::Cursor;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use calamine::{Data, Range, Reader, open_workbook_auto_from_rs};
@@ -9,13 +8,14 @@ use calamine::{Data, Range, Reader, open_workbook_auto_from_rs};
 use super::reading::{Decimal, ReadOptions, Reading};
 use super::sheet::{Cell, Sheet, SheetError};
 use super::{DatasetError, text};
+use crate::caught::caught;
 
 /// Reads a spreadsheet; the array that is asked for is the name of a sheet.
 pub(super) fn read(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Reading, DatasetError> {
     let failed =
         |reason: String| DatasetError::Format { path: path.to_owned(), format: "a spreadsheet", reason };
-    let sheets = catch_unwind(AssertUnwindSafe(|| sheets(bytes)));
-    let sheets = sheets.map_err(|_| failed("it is damaged; save it again".to_owned()))?.map_err(failed)?;
+    let sheets = caught(|| sheets(bytes));
+    let sheets = sheets.ok_or_else(|| failed("it is damaged; save it again".to_owned()))?.map_err(failed)?;
     let names: Vec<String> = sheets.iter().map(|(name, _)| name.clone()).collect();
     let asked: Vec<_> =
         sheets.iter().filter(|(name, _)| options.array.as_ref().is_none_or(|asked| asked == name)).collect();

@@ -149,7 +149,10 @@ impl Sheet {
 
     fn text(&self, row: usize, column: usize) -> Option<&str> {
         let row = self.rows[row];
-        (column < row.cells).then(|| self.texts.get(&(row.start + column)))?.map(|text| &**text)
+        let at = row.start + column;
+        // A number is no text, and most cells are numbers.
+        let may_be = column < row.cells && self.values[at].is_nan();
+        may_be.then(|| self.texts.get(&at))?.map(|text| &**text)
     }
 
     fn mark(&self, row: usize, column: usize) -> Option<Mark> {
