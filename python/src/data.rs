@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use spectroll::{
@@ -131,7 +131,7 @@ pub(crate) fn read<'py>(py: Python<'py>, path: PathBuf, settings: Settings) -> P
     let name = table.name().replace(&format!("{full:?}"), &file);
     let spectra = PyArray2::zeros(py, [table.len(), table.wavelengths().len()], false);
     // Nobody else has it yet.
-    for (mut row, index) in spectra.try_readwrite()?.as_array_mut().rows_mut().into_iter().zip(0..) {
+    for (mut row, index) in spectra.readwrite().as_array_mut().rows_mut().into_iter().zip(0..) {
         row.iter_mut().zip(table.spectrum(index)).for_each(|(to, from)| *to = *from);
     }
     let kind = table.kind().map(|kind| kind.to_string());
