@@ -163,7 +163,7 @@ fn command_of(line: &str) -> Result<Option<Step>, String> {
 }
 
 /// The arguments with counts above 10^4 draws lowered to that, ranges of scenes to the first 4 of them, and scene files
-/// that are drawn whole to their first 4 scenes. A report takes a minute, and `tests/cli.rs` makes one: here `--help`
+/// that are drawn whole to their first 4 scenes. A report takes a minute, and `tests/report.rs` makes one: here `--help`
 /// after its arguments tells whether they are understood.
 fn lowered(arguments: &[String]) -> Vec<String> {
     let mut arguments = arguments.to_vec();
