@@ -6,7 +6,6 @@
 mod program;
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
@@ -169,9 +168,11 @@ fn check(folder: &Path, output: &str, account: &str, succeeded: bool, may_be_not
     // Whatever is left, the next run gets by: one that replaces, or one that goes on.
     let (option, seed) = match (output.contains("--chunk"), end) {
         (true, End::Unfinished) => {
-            let manifest = fs::read_to_string(folder.join(format!("{name}.partial/_manifest.json")));
             // A set that was killed before it had a manifest is begun anew.
-            let is_second = manifest.is_ok_and(|manifest| manifest.contains("\"seed\": 2"));
+            let is_of_second = |(path, bytes): &(String, Vec<u8>)| {
+                path.contains("manifest") && String::from_utf8_lossy(bytes).contains("\"seed\": 2")
+            };
+            let is_second = tree(&folder.join(format!("{name}.partial"))).iter().any(is_of_second);
             ("--resume", if is_second { 2 } else { 1 })
         }
         _ => ("--force", 1),

@@ -7,7 +7,10 @@
 
 use std::fmt::Write as _;
 
-use spectroll::{Dataset, DatasetError, Extrapolation, Grid, ReadOptions, Reading, SpectrumKind, Table};
+use spectroll::{
+    Dataset, DatasetError, Extrapolation, Grid, ReadOptions, Reading, Remedy, SpectrumKind, Table,
+    WavelengthUnit,
+};
 
 /// Steele, Lea & Flood's generator: a table of a seed is always the same.
 struct Random(u64);
@@ -425,4 +428,45 @@ fn a_wrong_reading_is_noticed() {
         noticed += 1;
     }
     assert_eq!(noticed, 200);
+}
+
+/// Whatever stands before the spectra, the refusal names the unit that mends it.
+#[test]
+fn other_units_are_named_in_both_layouts() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let nm: Vec<f64> = (0..16).map(|i| 400.0 + 20.0 * f64::from(i)).collect();
+    let value = |spectrum: usize, band: usize| 20.0 + 10.0 * (spectrum as f64) + (band as f64 * 0.7).sin();
+    for (unit, of) in [
+        (WavelengthUnit::Um, (|nm| nm / 1e3) as fn(f64) -> f64),
+        (WavelengthUnit::Angstrom, |nm| nm * 10.0),
+        (WavelengthUnit::PerCm, |nm| 1e7 / nm),
+    ] {
+        for ids in ["", "id,s", "sample,"] {
+            let (head, prefix) = ids.split_once(',').unwrap_or_default();
+            let first = |text: String| if ids.is_empty() { String::new() } else { text + "," };
+            let joined = |cells: Vec<String>| cells.join(",");
+            let mut rows = first(head.to_owned()) + &joined(nm.iter().map(|&w| of(w).to_string()).collect());
+            for spectrum in 0..3 {
+                let values = (0..nm.len()).map(|band| format!("{:.3}", value(spectrum, band))).collect();
+                rows += &format!("\n{}{}", first(format!("{prefix}{}", spectrum + 7)), joined(values));
+            }
+            let mut columns = format!("{},a,b,c", if head.is_empty() { "x" } else { head });
+            for (band, &w) in nm.iter().enumerate() {
+                let values = (0..3).map(|spectrum| format!("{:.3}", value(spectrum, band))).collect();
+                columns += &format!("\n{},{}", of(w), joined(values));
+            }
+            for text in [rows, columns] {
+                let path = folder.path().join("x.csv");
+                std::fs::write(&path, &text).expect("the folder is there");
+                let error = Table::read(&path, &ReadOptions::default()).expect_err(&text);
+                assert_eq!(error.remedy(), Remedy::Unit(unit), "{error}\n{text}");
+                let read = Table::read(&path, &ReadOptions { unit: Some(unit), ..ReadOptions::default() });
+                let table = read.unwrap_or_else(|e| panic!("{e}\n{text}")).table;
+                assert!(
+                    table.len() == 3
+                        && table.wavelengths().iter().zip(&nm).all(|(a, b)| (a - b).abs() < 1e-6)
+                );
+            }
+        }
+    }
 }

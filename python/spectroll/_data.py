@@ -47,11 +47,19 @@ class Spectra:
         name: str = "the spectra",
         notes: Sequence[str] = (),
     ) -> None:
-        array = np.array(values, np.float64, ndmin=2)
         given = wavelengths_of(wavelengths)
         if isinstance(given, str):
             given = _spectroll.wavelengths(given)
-        grid = np.array(given)
+        self._set(np.array(values, np.float64, ndmin=2), np.array(given), kind, name, notes)
+
+    def _set(
+        self,
+        array: NDArray[np.float64],
+        grid: NDArray[np.float64],
+        kind: str | None,
+        name: str,
+        notes: Sequence[str],
+    ) -> None:
         if array.ndim != 2 or array.shape[1] != len(grid):
             shape = " x ".join(map(str, array.shape))
             raise ValueError(
@@ -60,6 +68,13 @@ class Spectra:
         array.flags.writeable = grid.flags.writeable = False
         self._values, self._wavelengths, self._kind, self._name = array, grid, kind, name
         self._notes = tuple(notes)
+
+    @classmethod
+    def _of(cls, values: NDArray[np.float64], wavelengths: NDArray[np.float64], *named: Any) -> Spectra:
+        """Spectra of arrays that nobody else has."""
+        spectra = cls.__new__(cls)
+        spectra._set(values, wavelengths, *named)
+        return spectra
 
     @property
     def values(self) -> NDArray[np.float64]:
@@ -209,4 +224,4 @@ def read(
         "scale": float(scale),
     }
     values, at, kind, name, notes = _spectroll.read(os.fspath(path), settings)
-    return Spectra(values, at, kind=kind, name=name, notes=notes)
+    return Spectra._of(values, at, kind, name, notes)

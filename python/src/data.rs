@@ -129,13 +129,12 @@ pub(crate) fn read<'py>(py: Python<'py>, path: PathBuf, settings: Settings) -> P
     // A folder on this machine is nobody else's business, and models keep the name.
     let (full, file) = (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy());
     let name = table.name().replace(&format!("{full:?}"), &file);
-    let spectra = PyArray2::zeros(py, [table.len(), table.wavelengths().len()], false);
-    // Nobody else has it yet.
-    for (mut row, index) in spectra.readwrite().as_array_mut().rows_mut().into_iter().zip(0..) {
-        row.iter_mut().zip(table.spectrum(index)).for_each(|(to, from)| *to = *from);
-    }
     let kind = table.kind().map(|kind| kind.to_string());
-    Ok((spectra, PyArray1::from_slice(py, table.wavelengths()), kind, name, notes))
+    let wavelengths = PyArray1::from_slice(py, table.wavelengths());
+    let shape = [table.len(), table.wavelengths().len()];
+    // The array takes over the memory of the table.
+    let spectra = PyArray1::from_vec(py, table.into_values()).reshape(shape)?;
+    Ok((spectra, wavelengths, kind, name, notes))
 }
 
 /// Spectra in rows at other wavelengths, and what was done to bring them there.

@@ -5,11 +5,14 @@
 //! `S_vrhel`. Elsewhere a vector of wavelengths lies beside the matrix, by one of many names or by none: then its numbers
 //! must be wavelengths, and its length that of a side of the matrix.
 
+use std::mem;
 use std::path::Path;
+use std::ptr;
 
 use nalgebra::DMatrix;
 
 use super::axis;
+use super::numbers::transposed;
 use super::reading::{ReadOptions, Reading, TableLayout};
 use super::units::{WavelengthUnit, is_wavelength_word};
 use super::{DatasetError, Remedy, SpectrumKind, Table};
@@ -111,26 +114,30 @@ enum Source {
 }
 
 /// The table of the array that the options name, or of the only one with its wavelengths.
-pub(super) fn choose(path: &Path, arrays: &Arrays, options: &ReadOptions) -> Result<Reading, DatasetError> {
+pub(super) fn choose(
+    path: &Path,
+    mut arrays: Arrays,
+    options: &ReadOptions,
+) -> Result<Reading, DatasetError> {
     let mut waves: Vec<Wave> = arrays.all.iter().filter_map(|array| wave(array, options)).collect();
     if let Some(name) = &options.wavelength_array {
-        waves = vec![asked_wave(path, arrays, name, options)?];
+        waves = vec![asked_wave(path, &arrays, name, options)?];
     }
     if let Some(values) = &options.measured_at {
         waves = vec![given(values)];
     }
-    let mut found = candidates(path, arrays, &waves, options)?;
+    let mut found = candidates(path, &arrays, &waves, options)?;
     if found.is_empty()
         && let Some(values) = &options.fallback
     {
-        found = candidates(path, arrays, &[given(values)], options)?;
+        found = candidates(path, &arrays, &[given(values)], options)?;
     }
     let chosen = match (found.as_slice(), &options.array) {
         ([], Some(variable)) => {
-            let (variable, found) = (variable.clone(), listed(arrays));
+            let (variable, found) = (variable.clone(), listed(&arrays));
             return Err(DatasetError::NoVariable { path: path.to_owned(), variable, found });
         }
-        ([], None) => return Err(nothing(path, arrays, options)),
+        ([], None) => return Err(nothing(path, &arrays, options)),
         ([one], _) => one,
         (several, _) => {
             let is_draws =
@@ -145,7 +152,12 @@ pub(super) fn choose(path: &Path, arrays: &Arrays, options: &ReadOptions) -> Res
             }
         }
     };
-    extract(path, arrays, chosen, options)
+    let (array, wave) = chosen;
+    let index = arrays.all.iter().position(|other| ptr::eq(other, *array)).expect("it is one of them");
+    let wave = wave.clone();
+    // They may be half a gigabyte, and are moved.
+    let values = mem::take(&mut arrays.all[index].values);
+    extract(path, (&arrays, index), values, &wave, options)
 }
 
 fn given(values: &[f64]) -> Wave {
@@ -305,10 +317,12 @@ fn wave_of(array: &Array, waves: &[Wave]) -> Result<Option<Wave>, Vec<String>> {
 /// The table of an array and its wavelengths.
 fn extract(
     path: &Path,
-    arrays: &Arrays,
-    (array, wave): &(&Array, Wave),
+    (arrays, index): (&Arrays, usize),
+    values: Vec<f64>,
+    wave: &Wave,
     options: &ReadOptions,
 ) -> Result<Reading, DatasetError> {
+    let array = &arrays.all[index];
     let bands = wave.values.len();
     let name = format!("{path:?}:{}", array.name);
     let own = (arrays.kind.is_some() || arrays.is_convention) && DRAWS.contains(&array.own_name());
@@ -317,15 +331,12 @@ fn extract(
     let inner: usize = array.sides[..side].iter().product();
     let outer: usize = array.sides[side + 1..].iter().product();
     let spectra = match inner {
-        1 => DMatrix::from_column_slice(bands, outer, &array.values),
-        _ => DMatrix::from_iterator(
-            bands,
-            inner * outer,
-            (0..inner * outer).flat_map(|spectrum| {
-                let start = spectrum % inner + inner * bands * (spectrum / inner);
-                (0..bands).map(move |band| array.values[start + inner * band])
-            }),
-        ),
+        1 => DMatrix::from_vec(bands, outer, values),
+        // Each of the outer parts has its bands in rows.
+        _ => {
+            let parts = values.chunks_exact(inner * bands);
+            DMatrix::from_vec(bands, inner * outer, parts.flat_map(|part| transposed(part, inner)).collect())
+        }
     };
     let mut notes = arrays.notes.clone();
     let mut table = Table::from_measured(&name, wave.values.clone(), spectra, &mut notes)?;

@@ -93,7 +93,7 @@ impl BuiltinTable {
         };
         let options = ReadOptions { array: Some(variable.to_owned()), ..ReadOptions::default() };
         let path = Path::new(self.name());
-        let reading = mat::arrays(path, bytes).and_then(|arrays| arrays::choose(path, &arrays, &options));
+        let reading = mat::arrays(path, bytes).and_then(|arrays| arrays::choose(path, arrays, &options));
         let mut table = reading.expect("compiled-in tables are readable").table;
         table.name = self.name().to_owned();
         table.source = table.name.clone();

@@ -11,7 +11,7 @@ use super::{DatasetError, MAX_VALUES, Table, files, npy, text, zarr};
 /// Reads a folder.
 pub(super) fn read(folder: &Path, options: &ReadOptions) -> Result<Reading, DatasetError> {
     if zarr::is_store(folder) {
-        return arrays::choose(folder, &zarr::arrays(folder)?, options);
+        return arrays::choose(folder, zarr::arrays(folder)?, options);
     }
     let parts = files::files(folder, "npy")?;
     if !parts.is_empty() {
@@ -68,7 +68,7 @@ fn npy_parts(folder: &Path, parts: &[PathBuf], options: &ReadOptions) -> Result<
         }
     }
     found.kind = manifest_kind(folder);
-    arrays::choose(folder, &found, options)
+    arrays::choose(folder, found, options)
 }
 
 /// Kind of the draws of a set of this program, from its manifest.

@@ -41,17 +41,17 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
     }
     let bytes = files::read(path)?;
     if is_hdf5(&bytes) {
-        return choose(path, &hdf5_bytes(path, bytes)?, options);
+        return choose(path, hdf5_bytes(path, bytes)?, options);
     }
     if npy::begins(&bytes) {
-        return choose(path, &npy::arrays(path, &bytes)?, options);
+        return choose(path, npy::arrays(path, &bytes)?, options);
     }
     if bytes.starts_with(b"PAR1") {
         return parquet(path, bytes, options);
     }
     if bytes.starts_with(b"PK") {
         return match npz::kind(&bytes) {
-            npz::Archive::Npz => choose(path, &npz::arrays(path, &bytes)?, options),
+            npz::Archive::Npz => choose(path, npz::arrays(path, &bytes)?, options),
             npz::Archive::Spreadsheet => spreadsheet::read(path, &bytes, options),
             npz::Archive::Other => Err(unknown(path, "an archive", "unpack it first")),
         };
@@ -64,10 +64,10 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
         return Err(unknown(path, found, advice));
     }
     if let Some(header) = envi::header(path, &bytes)? {
-        return choose(path, &envi::arrays(path, &header)?, options);
+        return choose(path, envi::arrays(path, &header)?, options);
     }
     if mat::begins(&bytes) || bytes.starts_with(b"MATLAB") {
-        return choose(path, &mat::arrays(path, &bytes)?, options);
+        return choose(path, mat::arrays(path, &bytes)?, options);
     }
     if is_binary(&bytes) {
         let advice = "expected text, MATLAB, HDF5, NumPy, Parquet, a spreadsheet or an ENVI library; export the spectra as \

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::DatasetError;
 use super::arrays::{Array, Arrays, Order};
-use super::numbers::Number;
+use super::numbers::{Number, transposed};
 
 /// Largest header that is read, in bytes; NumPy reads no longer one either, unless it is told to.
 const MAX_HEADER: usize = 10_000;
@@ -70,6 +70,9 @@ pub(super) fn array(name: &str, bytes: &[u8]) -> Result<Array, String> {
 pub(super) fn turned(sides: &[usize], values: &[f64]) -> Vec<f64> {
     if sides.iter().filter(|side| **side != 1).count() <= 1 {
         return values.to_vec();
+    }
+    if let [first, _] = *sides {
+        return transposed(values, first);
     }
     let mut strides = vec![1; sides.len()];
     for i in 1..sides.len() {

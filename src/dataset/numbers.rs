@@ -90,6 +90,24 @@ impl Number {
     }
 }
 
+/// A matrix of as many columns, row by row, with its rows and columns exchanged. It goes by tiles: of a large matrix, each
+/// value of a column lies in a page of its own.
+pub(super) fn transposed(values: &[f64], columns: usize) -> Vec<f64> {
+    const TILE: usize = 32;
+    let rows = values.len() / columns.max(1);
+    let mut turned = vec![0.0; values.len()];
+    for (first, corner) in
+        (0..rows).step_by(TILE).flat_map(|row| (0..columns).step_by(TILE).map(move |column| (row, column)))
+    {
+        for row in first..rows.min(first + TILE) {
+            for column in corner..columns.min(corner + TILE) {
+                turned[column * rows + row] = values[row * columns + column];
+            }
+        }
+    }
+    turned
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,5 +119,18 @@ mod tests {
         assert_eq!(Number::spelled("uint16", true).unwrap().read_all(&[1, 0, 0, 2, 9]), [256.0, 2.0]);
         assert_eq!(Number::spelled("float32", false).unwrap().read_all(&0.5f32.to_le_bytes()), [0.5]);
         assert_eq!((Number::named("<c8"), Number::spelled("complex64", false)), (None, None));
+    }
+
+    #[test]
+    fn matrices_of_any_size_are_turned() {
+        for (rows, columns) in [(1, 5), (5, 1), (33, 70), (64, 32)] {
+            let values: Vec<f64> = (0..rows * columns).map(|i| i as f64).collect();
+            let turned = transposed(&values, columns);
+            assert!(
+                (0..rows).all(|r| (0..columns).all(|c| turned[c * rows + r] == values[r * columns + c])),
+                "{rows} x {columns}"
+            );
+            assert_eq!(transposed(&turned, rows), values);
+        }
     }
 }

@@ -111,7 +111,7 @@ impl Columns {
                 let sides = if width == 0 { vec![0] } else { vec![width, values.len() / width] };
                 found.all.push(Array { name, sides, values, unit: None });
             }
-            return arrays::choose(path, &found, options);
+            return arrays::choose(path, found, options);
         }
         let mut sheet = Sheet::new("row");
         let rows =

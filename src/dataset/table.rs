@@ -118,15 +118,15 @@ impl Table {
         let (full, file) =
             (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy());
         table.source = table.name.replace(&format!("{full:?}"), &file);
-        let mut marked = 0;
-        for value in table.spectra.iter_mut() {
-            // NaN is missing already.
-            if options.missing_values.iter().any(|missing| close(*missing, *value)) {
-                *value = f64::NAN;
-                marked += 1;
-            }
-        }
         if !options.missing_values.is_empty() {
+            let mut marked = 0;
+            for value in table.spectra.iter_mut() {
+                // NaN is missing already.
+                if options.missing_values.iter().any(|missing| close(*missing, *value)) {
+                    *value = f64::NAN;
+                    marked += 1;
+                }
+            }
             let marked = counted(marked, "value", "values");
             reading.notes.push(format!("marked {marked} as missing, as asked for"));
         }
@@ -140,7 +140,9 @@ impl Table {
 
     /// Spectra multiplied by `factor`: 0.01 makes reflectances of percentages.
     pub fn scaled(mut self, factor: f64) -> Table {
-        self.spectra *= factor;
+        if factor != 1.0 {
+            self.spectra *= factor;
+        }
         self
     }
 
@@ -175,6 +177,11 @@ impl Table {
     #[allow(clippy::len_without_is_empty)] // a table is never empty
     pub fn len(&self) -> usize {
         self.spectra.ncols()
+    }
+
+    /// The values of all spectra, one spectrum after the other, without a copy; NaN where one was not measured.
+    pub fn into_values(self) -> Vec<f64> {
+        self.spectra.data.into()
     }
 
     /// The values of one spectrum, one per wavelength; NaN where it was not measured.

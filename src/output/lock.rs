@@ -78,6 +78,13 @@ impl LockFile {
     }
 }
 
+/// Waits for the lock of a folder, which processes hold while they change two names in it that belong together. `None` where
+/// folders cannot be locked.
+pub(super) fn lock_folder(folder: &Path) -> Option<File> {
+    let file = cfg!(unix).then(|| File::open(folder).ok())??;
+    file.lock().is_ok().then_some(file)
+}
+
 /// Locks a temporary file of this process, so that no other sweeps it. `false` where one did already.
 pub(super) fn hold(file: &File, path: &Path) -> bool {
     // Where locks keep others from reading, libraries that open the file by its name could not.

@@ -303,14 +303,13 @@ impl FileWriter {
     /// Makes the file appear under its name, complete and on disk.
     pub fn finish(self) -> Result<(), OutputError> {
         self.encoder.finish().map_err(|e| self.pending.failed(e))?;
-        Sidecar::remove(self.pending.path())?;
-        self.pending.finish()
+        Sidecar::finish(None, self.pending)
     }
 
     /// Makes the file appear under its name, and its sidecar beside it.
     pub fn finish_with(self, sidecar: Sidecar) -> Result<(), OutputError> {
         self.encoder.finish().map_err(|e| self.pending.failed(e))?;
-        sidecar.finish(self.pending)
+        Sidecar::finish(Some(sidecar), self.pending)
     }
 }
 

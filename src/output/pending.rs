@@ -87,9 +87,26 @@ impl PendingFile {
             IfExists::Refuse => file.persist_noclobber(&path), // nobody's file that appeared meanwhile
             IfExists::Replace => file.persist(&path),
         }
-        .map_err(|e| failed(e.error))?;
+        .map_err(|e| match e.error.kind() {
+            io::ErrorKind::AlreadyExists if existing == IfExists::Refuse => {
+                OutputError::Exists { path: path.clone() }
+            }
+            _ => failed(e.error),
+        })?;
         sync_folder(folder(&path));
         Ok(())
+    }
+
+    /// Brings what was written onto the disk, so that [`finish`](Self::finish) takes no time; refuses a file that appeared
+    /// under its name meanwhile.
+    pub(super) fn ready(&self) -> Result<(), OutputError> {
+        self.file.as_file().sync_all().map_err(|source| self.failed(source))?;
+        match self.existing {
+            IfExists::Refuse if self.path.symlink_metadata().is_ok() => {
+                Err(OutputError::Exists { path: self.path.clone() })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Makes an error of writing, with the name that was being written.

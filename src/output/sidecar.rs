@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::lock::lock_folder;
 use super::pending::{PendingFile, folder, ignore_missing, place, sync_folder};
 use super::set::check::check_schema;
 use super::sum::{LARGEST, Sum, is_signed, signed};
@@ -79,30 +80,42 @@ impl Sidecar {
         Ok(sidecar)
     }
 
-    /// Removes the sidecar of a file that is replaced, or was deleted, by one that has none.
-    pub(super) fn remove(file: &Path) -> Result<(), OutputError> {
+    /// Makes a file appear under its name, and its sidecar beside it, if it has one; that of a file before it goes. There is
+    /// no moment at which the sidecar is that of another file, whoever else writes the same name: the folder is locked
+    /// meanwhile, where folders can be.
+    pub(super) fn finish(sidecar: Option<Sidecar>, pending: PendingFile) -> Result<(), OutputError> {
+        let path = pending.path().to_owned();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let sidecar = sidecar
+            .map(|sidecar| Sum::of_file(&name, pending.temporary_path()).map(|sum| sidecar.of(sum)))
+            .transpose()
+            .map_err(|e| pending.failed(e))?;
+        pending.ready()?;
+        let _alone = lock_folder(folder(&path));
+        // Again, for whoever held the lock before: the sidecar of a file that stays must stay too.
+        pending.ready()?;
+        Sidecar::remove(&path)?;
+        pending.finish()?;
+        let Some(sidecar) = sidecar else { return Ok(()) };
+        let beside = Sidecar::path(&path);
+        place(&beside, signed(&sidecar).as_bytes())
+            .map_err(|source| OutputError::Write { path: beside, source })?;
+        sync_folder(folder(&path));
+        Ok(())
+    }
+
+    fn of(self, file: Sum) -> Sidecar {
+        Sidecar { file: Some(file), ..self }
+    }
+
+    /// Removes the sidecar of a file that is replaced, or was deleted.
+    fn remove(file: &Path) -> Result<(), OutputError> {
         let path = Sidecar::path(file);
         match fs::remove_file(&path) {
             // A file whose name leaves no room for that of a sidecar has none.
             Err(e) if e.kind() == io::ErrorKind::InvalidFilename => Ok(()),
             removed => removed.or_else(ignore_missing).map_err(|source| OutputError::Write { path, source }),
         }
-    }
-
-    /// Makes a file and its sidecar appear under their names. There is no moment at which the sidecar is that of another
-    /// file.
-    pub(super) fn finish(self, pending: PendingFile) -> Result<(), OutputError> {
-        let path = pending.path().to_owned();
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let sum = Sum::of_file(&name, pending.temporary_path()).map_err(|e| pending.failed(e))?;
-        Sidecar::remove(&path)?;
-        pending.finish()?;
-        let sidecar = Sidecar { file: Some(sum), ..self };
-        let beside = Sidecar::path(&path);
-        place(&beside, signed(&sidecar).as_bytes())
-            .map_err(|source| OutputError::Write { path: beside, source })?;
-        sync_folder(folder(&path));
-        Ok(())
     }
 
     /// Describes how a file differs from what was written, if it does. It may have another name.

@@ -122,6 +122,35 @@ impl Sheet {
             self.rows.pop();
             self.values.truncate(row.start);
         }
+        self.check_size()
+    }
+
+    /// Adds the rows of a sheet that was read apart, whose first line is the one after `lines` others.
+    pub(super) fn append(&mut self, sheet: Sheet, lines: usize) -> Result<(), SheetError> {
+        let start = self.values.len();
+        let moved = |row: Row| Row { line: row.line + lines, start: row.start + start, ..row };
+        self.rows.extend(sheet.rows.into_iter().map(moved));
+        self.texts.extend(sheet.texts.into_iter().map(|(at, text)| (at + start, text)));
+        self.marks.extend(sheet.marks.into_iter().map(|(at, mark)| (at + start, mark)));
+        match start {
+            0 => self.values = sheet.values,
+            _ => self.values.extend(sheet.values),
+        }
+        self.check_size()
+    }
+
+    /// Whether two sheets have the same cells at the same places.
+    #[cfg(test)]
+    pub(in crate::dataset) fn is(&self, other: &Sheet) -> bool {
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        self.rows == other.rows
+            && self.values.len() == other.values.len()
+            && self.values.iter().zip(&other.values).all(same)
+            && self.texts == other.texts
+            && self.marks == other.marks
+    }
+
+    fn check_size(&self) -> Result<(), SheetError> {
         if self.values.len() > MAX_CELLS || self.rows.len() > MAX_CELLS / 8 {
             return Err(SheetError::new(
                 "it has more cells than 512 MiB hold: split it, or keep only the spectra",

@@ -43,7 +43,9 @@ impl Heading {
         decimal: Decimal,
     ) -> Result<Heading, SheetError> {
         let mut best: Option<Heading> = None;
-        let mut fault: Option<(usize, SheetError)> = None;
+        // A row whose numbers are wavelengths in another unit comes closer than a longer one of values.
+        let closeness = |length: usize, error: &SheetError| (matches!(error.remedy, Remedy::Unit(_)), length);
+        let mut fault: Option<((bool, usize), SheetError)> = None;
         for row in 0..sheet.rows.len().min(ROWS) {
             for run in runs(sheet, row, decimal) {
                 let length = run.raw.len();
@@ -51,8 +53,10 @@ impl Heading {
                     Ok(heading) if best.as_ref().is_none_or(|best| best.axis.values.len() < length) => {
                         best = Some(heading);
                     }
-                    Err(error) if fault.as_ref().is_none_or(|(most, _)| *most < length) => {
-                        fault = Some((length, error));
+                    Err(error)
+                        if fault.as_ref().is_none_or(|(most, _)| *most < closeness(length, &error)) =>
+                    {
+                        fault = Some((closeness(length, &error), error));
                     }
                     _ => {}
                 }

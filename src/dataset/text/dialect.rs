@@ -9,6 +9,7 @@ use std::fmt;
 use crate::dataset::error::Remedy;
 use crate::dataset::reading::{Decimal, ReadOptions, Separator};
 use crate::dataset::sheet::{Cell, Sheet, SheetError, score};
+use crate::threads;
 
 /// Lines, and bytes, from which a dialect is told.
 const SAMPLE: usize = 2000;
@@ -141,13 +142,54 @@ fn uncommented(line: &str) -> (&str, bool) {
 }
 
 fn plain(text: &str, dialect: Dialect, skip: usize, limit: Option<usize>) -> Result<Sheet, SheetError> {
+    let start =
+        lines(text).nth(skip).map_or(text.len(), |(_, line)| line.as_ptr() as usize - text.as_ptr() as usize);
+    let text = &text[start..];
+    let parts = match limit {
+        Some(_) => vec![text],
+        None => parts(text),
+    };
+    let sheets =
+        threads::map(parts.len() as u64, 1, |part| part_of_plain(parts[part as usize], dialect, limit));
+    let mut all = Sheet::new("line");
+    let mut number = skip;
+    for sheet in sheets {
+        let (sheet, lines) = sheet?;
+        all.append(sheet, number)?;
+        number += lines;
+    }
+    Ok(all)
+}
+
+/// Text in parts of whole lines, for as many threads; one alone where it is short.
+fn parts(text: &str) -> Vec<&str> {
+    const LEAST: usize = 1 << 20;
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let size = text.len().div_ceil(threads).max(LEAST);
+    let (mut parts, mut rest) = (Vec::new(), text);
+    while rest.len() > size {
+        let end = rest.as_bytes()[size..].iter().position(|b| matches!(b, b'\n' | b'\r'));
+        let Some(end) = end.map(|end| size + end) else { break };
+        let after = if rest.as_bytes()[end..].starts_with(b"\r\n") { end + 2 } else { end + 1 };
+        // What ends a line is one byte, so that both parts are text.
+        let (part, others) = rest.split_at(after);
+        parts.push(part);
+        rest = others;
+    }
+    parts.push(rest);
+    parts
+}
+
+/// The cells of some lines, and how many lines they are.
+fn part_of_plain(text: &str, dialect: Dialect, limit: Option<usize>) -> Result<(Sheet, usize), SheetError> {
     let mut sheet = Sheet::new("line");
-    let mut bytes = 0;
-    for (number, line) in lines(text).skip(skip) {
+    let (mut bytes, mut count) = (0, 0);
+    for (number, line) in lines(text) {
         bytes += line.len();
         if limit.is_some_and(|limit| sheet.len() >= limit || bytes > SAMPLE_BYTES && sheet.len() > 20) {
             break;
         }
+        count = number;
         let (line, is_comment) = uncommented(line);
         sheet.begin_row(number, is_comment);
         let parse = |text| Cell::parse(text, dialect.decimal);
@@ -157,7 +199,7 @@ fn plain(text: &str, dialect: Dialect, skip: usize, limit: Option<usize>) -> Res
         }
         sheet.end_row()?;
     }
-    Ok(sheet)
+    Ok((sheet, count))
 }
 
 /// Gives the words of a line, where quotes keep blanks together and a unit belongs to the number before it.
@@ -230,4 +272,30 @@ fn quoted(
         sheet.end_row()?;
     }
     Ok(Some(sheet))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever ends the lines, and wherever the parts meet.
+    #[test]
+    fn parts_are_read_as_the_whole() {
+        for end in ["\n", "\r\n", "\r"] {
+            let line = |i: usize| match i % 1000 {
+                0 => String::new(),
+                1 => format!("# note {i}"),
+                2 => format!("name {i},12 %,"),
+                _ => format!("{i},{}.5,-0.25", i % 7),
+            };
+            let text: String = (1..200_000).map(|i| line(i) + end).collect();
+            assert!(text.len() > 2 << 20);
+            let dialect = Dialect { separator: Separator::Comma, decimal: Decimal::Point };
+            let (whole, lines) = part_of_plain(&text, dialect, None).unwrap();
+            assert_eq!(lines, 199_999);
+            assert!(plain(&text, dialect, 0, None).unwrap().is(&whole), "{end:?}");
+            let skipped = plain(&text, dialect, 5, None).unwrap();
+            assert_eq!(skipped.len(), whole.len() - 5);
+        }
+    }
 }
