@@ -93,8 +93,8 @@ def test_files_are_read_with_the_settings_of_the_program(tmp_path):
     grid = np.arange(400, 701, 50)
     values = np.random.default_rng(3).uniform(0.2, 0.8, (5, 7)).round(3)
     rows = ["\t".join(["id", *(f"{w / 1000:.2f}" for w in grid)])]
-    rows += ["\t".join([f"s{i}", *(f"{100 * v:.1f}".replace(".", ",") for v in row)]) for i, row in enumerate(values)]
-    text = "measured by nobody\n" + "\n".join(rows).replace("0.", "0,") + "\n"
+    rows += ["\t".join([f"s{i}", *(f"{100 * v:.1f}" for v in row)]) for i, row in enumerate(values)]
+    text = "measured by nobody\n" + "\n".join(rows).replace(".", ",") + "\n"
     path = tmp_path / "um.txt"
     path.write_text(text)
     with pytest.raises(spectroll.DataError, match=r'unit="um"'):

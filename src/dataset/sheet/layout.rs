@@ -147,7 +147,8 @@ pub(in crate::dataset) fn lay_out(
 fn preferred(column: &Column, heading: &Heading) -> Option<(TableLayout, &'static str)> {
     let across = (TableLayout::Rows, "the numbers of its first column are those of samples");
     let down = (TableLayout::Columns, "the numbers of its heading are those of samples");
-    if column.is_of_samples {
+    // A heading that says samples over numbers that only wavelengths are is wrong.
+    if column.is_of_samples && (heading.axis.is_strong() || !column.axis.is_strong()) {
         return Some(across);
     }
     if column.is_named && heading.is_lettered {
