@@ -26,6 +26,9 @@ pub(crate) fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
         return Err(too_large(&found.len().to_string()));
     }
     let mut bytes = Vec::new();
+    if found.is_file() {
+        bytes.try_reserve_exact(found.len() as usize + 1)?; // a byte more, so that the end is seen without growing
+    }
     File::open(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > limit {
         true => Err(too_large("more")),
