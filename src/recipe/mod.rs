@@ -165,6 +165,15 @@ impl Recipe {
 
     /// The largest luminous reflectance that reflectances of a model can be scaled to and stay below 1, which none
     /// quite reaches: from a linear program. `None` of illuminants, and of a grid without visible light.
+    ///
+    /// ```
+    /// use spectroll::{Model, Recipe};
+    ///
+    /// let largest = Recipe::largest_lrv(&Model::builtin("munsell-vrhel")?).expect("they are reflectances");
+    /// assert!((largest - 0.9959).abs() < 1e-4);
+    /// assert_eq!(Recipe::largest_lrv(&Model::builtin("granada")?), None);
+    /// # Ok::<(), spectroll::ModelError>(())
+    /// ```
     pub fn largest_lrv(model: &Model) -> Option<f64> {
         let weights =
             colorimetry::lrv_weights(model.grid()).filter(|_| model.kind() == SpectrumKind::Reflectance)?;
