@@ -1,9 +1,12 @@
-// Draw `index` of a stream: candidates until one is accepted, attempt by attempt. CPU twin: src/cpu/mod.rs. Lines
-// that end in `// if` and a word are kept only for programs with that property; src/wgsl/mod.rs filters them.
+//! CPU twin: src/cpu/mod.rs. Lines that end in `// if` and a word are kept only for programs with that property;
+//! src/wgsl/shader.rs filters them. The loop ends by its condition and not by `break`: llvmpipe runs that form a quarter
+//! faster.
+
+// Draw `index` of a stream: candidates until one is accepted, attempt by attempt.
 
 struct Draw {
     z: Normals,
-    // The candidates it took; 0 where none of `max_attempts` was accepted.
+    // The candidates it took; 0 where it failed.
     attempts: u32,
     // The number of the candidate that comes next. // if sliced
     tried: u32, // if sliced
@@ -11,9 +14,10 @@ struct Draw {
     scale: f32, // if scaled
     // The target luminous reflectance that is its own. // if own_targets
     target_lrv: f32, // if own_targets
+    // A zero that is known at run time alone. // if carries_zero
+    zero: u32, // if carries_zero
 }
 
-// The loop ends by its condition and not by `break`: llvmpipe runs that form a quarter faster.
 fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, max_attempts: u32) -> Draw { // if whole
 fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, first: u32, end: u32) -> Draw { // if sliced
     var result: Draw;
@@ -31,5 +35,6 @@ fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, first: u32, end: u32) 
     }
     result.tried = attempt; // if sliced
     result.scale = scale(SCALED); // if scaled
+    result.zero = zero; // if carries_zero
     return result;
 }

@@ -1,4 +1,6 @@
-// What a dispatch draws; src/sampler.rs writes it.
+//! src/wgsl/compute_shader.rs writes it.
+
+// What a dispatch draws.
 struct Parameters {
     key: vec2<u32>,
     first: vec2<u32>,
@@ -12,6 +14,8 @@ struct Parameters {
     row: u32,
     // The most candidates of a draw in one dispatch. // if sliced
     slice: u32, // if sliced
+    // Always 0, which no compiler knows. // if exact
+    @align(8) zero: u32, // if exact
 }
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
