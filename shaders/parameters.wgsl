@@ -10,13 +10,15 @@ struct Parameters {
     plane: u32,
     // How many draws a row has; 0 where there are no rows.
     row: u32,
-    // The most candidates of a draw in one dispatch. // if sliced
-    slice: u32, // if sliced
+    // The most candidates of a draw in one dispatch. // if in_slices
+    slice: u32, // if in_slices
 }
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
 // The draws, each by the words of its index, where they are those of a list. // if listed
 @group(0) @binding(INDICES_AT) var<storage, read> indices: array<vec2<u32>>; // if listed
+// The responses that each draw is given, draw by draw. // if given
+@group(0) @binding(GIVEN_AT) var<storage, read> givens: array<f32>; // if given
 
 // Draw i of the range.
 fn draw_at(i: u32) -> Draw {
@@ -28,11 +30,13 @@ fn draw_at(i: u32) -> Draw {
         index = vec2(low % parameters.row, parameters.first.y + low / parameters.row); // if ranged
     } // if ranged
     return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts); // if whole
-    let before = progress[i]; // if sliced
-    let attempts = attempts_of(before); // if sliced
-    let first = select(before & ~UNDONE, attempts - 1u, attempts != 0u); // if sliced
-    let end = select(min(first + parameters.slice, parameters.max_attempts), attempts, attempts != 0u); // if sliced
+    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts, given_at(i)); // if whole_given
+    let before = progress[i]; // if in_slices
+    let attempts = attempts_of(before); // if in_slices
+    let first = select(before & ~UNDONE, attempts - 1u, attempts != 0u); // if in_slices
+    let end = select(min(first + parameters.slice, parameters.max_attempts), attempts, attempts != 0u); // if in_slices
     let drawn = draw_of(parameters.key, index, parameters.stream, first, end); // if sliced
-    progress[i] = select(drawn.tried | UNDONE, drawn.attempts, drawn.attempts != 0u); // if sliced
-    return drawn; // if sliced
+    let drawn = draw_of(parameters.key, index, parameters.stream, first, end, given_at(i)); // if sliced_given
+    progress[i] = select(drawn.tried | UNDONE, drawn.attempts, drawn.attempts != 0u); // if in_slices
+    return drawn; // if in_slices
 }

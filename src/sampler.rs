@@ -9,7 +9,8 @@ use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::{DrawRange, Draws};
 use crate::recipe::Recipe;
 use crate::wgsl::{
-    self, COVER_AT, Dialect, INDICES_AT, Indexing, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT, TABLES_AT, Tables,
+    self, COVER_AT, Dialect, GIVEN_AT, INDICES_AT, Indexing, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT,
+    TABLES_AT, Tables,
 };
 
 /// The most dispatches that are recorded for one range: its draws take no more candidates than these try.
@@ -52,6 +53,8 @@ pub struct Sampler {
     slice: u32,
     draws_per_thread: u32,
     indexing: Indexing,
+    /// Number of responses that each draw is given.
+    given: usize,
 }
 
 /// Error returned where something cannot be drawn on a device, or not in one dispatch.
@@ -81,6 +84,15 @@ pub enum SamplerError {
     LargeTable { label: &'static str, bytes: u64, largest: u64, limit: &'static str },
     #[error("the device has no buffer for {label}: it was lost, or has no memory left")]
     NoBuffer { label: &'static str },
+    #[error(
+        "the recipe gives each draw {responses} responses, and there are none: prepare it with a buffer of them"
+    )]
+    NothingGiven { responses: usize },
+    #[error(
+        "a buffer of {bytes} bytes, where the responses that these draws are given need {needed} ({responses} of 4 bytes a \
+         draw)"
+    )]
+    Given { bytes: u64, needed: u64, responses: usize },
     #[error(
         "a range of {count} draws, where room for {prepared} was prepared: prepare the largest range first"
     )]
@@ -141,6 +153,7 @@ impl Sampler {
             program.proposal.is_some(),
             wgsl::is_sliced(program, target),
             indexing == Indexing::List,
+            program.given > 0,
         ];
         let buffers = (program.outputs.len() + others.into_iter().filter(|&there| there).count()) as u32;
         let largest = device.limits().max_storage_buffers_per_shader_stage;
@@ -175,6 +188,7 @@ impl Sampler {
             slice,
             draws_per_thread: wgsl::draws_per_thread(program, target),
             indexing,
+            given: program.given,
         })
     }
 
@@ -207,7 +221,8 @@ impl Sampler {
     fn limit(&self, limits: &wgpu::Limits) -> (u64, &'static str) {
         // Four draws, for which padding comes to nothing.
         let indices = if self.indexing == Indexing::List { 4 * INDEX_BYTES } else { 0 };
-        let four = self.formats.iter().map(|format| format.bytes(4)).chain([indices]);
+        let given = 4 * self.given_bytes();
+        let four = self.formats.iter().map(|format| format.bytes(4)).chain([indices, given]);
         let four = four.max().expect("something comes out");
         let values = self.formats.iter().map(|format| format.values(4)).max().expect("something comes out");
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(wgsl::WORKGROUP);
@@ -222,13 +237,44 @@ impl Sampler {
         .expect("there are limits")
     }
 
-    /// Allocates buffers for `draws`, and prepares to record them.
+    /// Bytes of the responses that a draw is given.
+    fn given_bytes(&self) -> u64 {
+        size_of::<f32>() as u64 * self.given as u64
+    }
+
+    /// Allocates buffers for `draws`, and prepares to record them. Draws that are given responses take
+    /// [`Sampler::prepare_given`].
     pub fn prepare(&self, device: &Device, draws: DrawRange) -> Result<Prepared, SamplerError> {
-        let largest = self.slice.saturating_mul(MOST_SLICES);
-        if self.max_attempts > largest {
-            return Err(SamplerError::TooManyAttempts { attempts: self.max_attempts, largest });
+        if self.given > 0 {
+            return Err(SamplerError::NothingGiven { responses: self.given });
         }
+        self.check_attempts()?;
         self.prepare_for(device, draws, BufferUsages::COPY_SRC)
+    }
+
+    /// Allocates buffers for `draws` that are given responses, and prepares to record them: those of
+    /// [`RecipeBuilder::given`](crate::RecipeBuilder::given). `colours` is a storage buffer of the host's with the f32
+    /// responses of each draw, draw by draw. Passes that are recorded read what it holds when they run.
+    pub fn prepare_given(
+        &self,
+        device: &Device,
+        draws: DrawRange,
+        colours: &wgpu::Buffer,
+    ) -> Result<Prepared, SamplerError> {
+        let (bytes, needed) = (colours.size(), draws.count * self.given_bytes());
+        if self.given == 0 || bytes < needed {
+            return Err(SamplerError::Given { bytes, needed, responses: self.given });
+        }
+        self.check_attempts()?;
+        self.prepare_with(device, draws, BufferUsages::COPY_SRC, Some(colours))
+    }
+
+    fn check_attempts(&self) -> Result<(), SamplerError> {
+        let largest = self.slice.saturating_mul(MOST_SLICES);
+        match self.max_attempts > largest {
+            true => Err(SamplerError::TooManyAttempts { attempts: self.max_attempts, largest }),
+            false => Ok(()),
+        }
     }
 
     /// Prepares as [`Sampler::prepare`] does, with buffers of another usage besides storage.
@@ -237,6 +283,17 @@ impl Sampler {
         device: &Device,
         draws: DrawRange,
         usage: BufferUsages,
+    ) -> Result<Prepared, SamplerError> {
+        self.prepare_with(device, draws, usage, None)
+    }
+
+    /// Prepares with the host's buffer of responses, or with one of its own where the draws are given any.
+    fn prepare_with(
+        &self,
+        device: &Device,
+        draws: DrawRange,
+        usage: BufferUsages,
+        colours: Option<&wgpu::Buffer>,
     ) -> Result<Prepared, SamplerError> {
         let (largest, limit) = self.limit(&device.limits());
         if draws.count > largest {
@@ -272,12 +329,22 @@ impl Sampler {
                 mapped_at_creation: false,
             })
         });
+        let own = (self.given > 0 && colours.is_none()).then(|| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("spectroll given responses"),
+                size: self.given_bytes() * capacity,
+                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        });
+        let given = colours.cloned().or(own);
         let at = |format: &ArrayFormat| OUTPUTS_AT + format.quantity as u32;
         let entries: Vec<_> = std::iter::once((PARAMETERS_AT, &parameters))
             .chain(self.tables.iter().map(|tables| (TABLES_AT, tables)))
             .chain(self.cover.iter().map(|cover| (COVER_AT, cover)))
             .chain(progress.iter().map(|progress| (PROGRESS_AT, progress)))
             .chain(indices.iter().map(|indices| (INDICES_AT, indices)))
+            .chain(given.iter().map(|given| (GIVEN_AT, given)))
             .chain(self.formats.iter().map(at).zip(&outputs))
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
@@ -293,6 +360,7 @@ impl Sampler {
             parameters,
             progress,
             indices,
+            given,
             outputs,
             count,
             prepared,
@@ -354,6 +422,8 @@ pub struct Prepared {
     progress: Option<wgpu::Buffer>,
     /// Indices of the draws, where they are given in a list.
     indices: Option<wgpu::Buffer>,
+    /// Responses that the draws are given, where they are given any.
+    given: Option<wgpu::Buffer>,
     /// Buffers, in the order of the sampler's formats.
     outputs: Vec<wgpu::Buffer>,
     count: u64,
@@ -435,6 +505,13 @@ impl Prepared {
         self.count = draws.count;
         queue.write_buffer(&self.parameters, 0, bytemuck::bytes_of(&self.sampler.parameters(draws)));
         Ok(())
+    }
+
+    /// Writes the responses that draws are given, no more than were prepared.
+    pub(crate) fn set_given(&self, queue: &wgpu::Queue, draws: Draws) {
+        if let Some(buffer) = &self.given {
+            queue.write_buffer(buffer, 0, bytemuck::cast_slice(draws.given));
+        }
     }
 
     /// Writes the indices of draws, for a shader that has them from a list: no more than were prepared.

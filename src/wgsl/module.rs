@@ -45,6 +45,8 @@ pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, WgslErro
     // What naga_oil imports may name structures, but no other types.
     let normals = format!("array<f32, {}>", program.components());
     let draw = draw.replace(&format!("alias Normals = {normals};\n"), "").replace("Normals", &normals);
+    let given = format!("array<f32, {}>", program.given);
+    let draw = draw.replace(&format!("alias Given = {given};\n"), "").replace("Given", &given);
     Ok(prefixed(&format!("{draw}\n{}", interface(program)), prefix))
 }
 
@@ -52,12 +54,11 @@ pub(crate) fn module(program: &Program, prefix: &str) -> Result<String, WgslErro
 fn interface(program: &Program) -> String {
     let attempts = program.max_attempts;
     let mut text = Text::default();
-    text.line("// Draw `index` (low word, high word) under a seed (the same), as every engine makes it.");
-    text.0 += "fn draw(seed: vec2<u32>, index: vec2<u32>) -> Draw {\n";
-    text.line(&format!("    return draw_of(seed, index, 0u, {attempts}u);\n}}\n"));
-    text.line("// The same, of the stream of this number.");
-    text.0 += "fn draw_in(stream: u32, seed: vec2<u32>, index: vec2<u32>) -> Draw {\n";
-    text.line(&format!("    return draw_of(seed, index, stream << 8u, {attempts}u);\n}}"));
+    if program.given > 0 {
+        draw_given(&mut text, program);
+    } else {
+        draw(&mut text, attempts);
+    }
     for output in &program.outputs {
         let quantity = output.format.quantity;
         let width = output.format.width;
@@ -93,6 +94,35 @@ fn interface(program: &Program) -> String {
         }
     }
     text.0
+}
+
+/// Writes the functions that make a draw of an index.
+fn draw(text: &mut Text, attempts: u32) {
+    text.line("// Draw `index` (low word, high word) under a seed (the same), as every engine makes it.");
+    text.0 += "fn draw(seed: vec2<u32>, index: vec2<u32>) -> Draw {\n";
+    text.line(&format!("    return draw_of(seed, index, 0u, {attempts}u);\n}}\n"));
+    text.line("// The same, of the stream of this number.");
+    text.0 += "fn draw_in(stream: u32, seed: vec2<u32>, index: vec2<u32>) -> Draw {\n";
+    text.line(&format!("    return draw_of(seed, index, stream << 8u, {attempts}u);\n}}"));
+}
+
+/// Writes the functions that make a draw of an index and of the responses that it is given: a vector of two to four of
+/// them, so that a texel goes in as it is.
+fn draw_given(text: &mut Text, program: &Program) {
+    let (attempts, count) = (program.max_attempts, program.given);
+    let (kind, parts) = match count {
+        1 => ("f32".to_owned(), "c".to_owned()),
+        2..=4 => (format!("vec{count}<f32>"), list(count, |i| format!("c.{}", ["x", "y", "z", "w"][i]))),
+        _ => (format!("array<f32, {count}>"), list(count, |i| format!("c[{i}]"))),
+    };
+    let given = format!("array<f32, {count}>({parts})");
+    text.line("// Draw `index` (low word, high word) under a seed (the same), given the responses c, as every engine makes it.");
+    text.0 += &format!("fn draw_given(seed: vec2<u32>, index: vec2<u32>, c: {kind}) -> Draw {{\n");
+    text.line(&format!("    return draw_of(seed, index, 0u, {attempts}u, {given});\n}}\n"));
+    text.line("// The same, of the stream of this number.");
+    text.0 +=
+        &format!("fn draw_given_in(stream: u32, seed: vec2<u32>, index: vec2<u32>, c: {kind}) -> Draw {{\n");
+    text.line(&format!("    return draw_of(seed, index, stream << 8u, {attempts}u, {given});\n}}"));
 }
 
 fn spectrum(text: &mut Text, program: &Program) {

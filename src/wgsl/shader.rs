@@ -3,8 +3,8 @@
 use super::arithmetic::{self, arithmetic};
 use super::store::store;
 use super::{
-    Dialect, Form, INDICES_AT, Indexing, PROGRESS_AT, Part, TABLES_AT, Tables, WORKGROUP, draws_per_thread,
-    part,
+    Dialect, Form, GIVEN_AT, INDICES_AT, Indexing, PROGRESS_AT, Part, TABLES_AT, Tables, WORKGROUP,
+    draws_per_thread, part,
 };
 use crate::program::{IntensityLaw, Program};
 use crate::quantity::Dtype;
@@ -29,6 +29,7 @@ const WORDS: &str = include_str!("../../shaders/words.wgsl");
 const HALF: &str = include_str!("../../shaders/half.wgsl");
 const MAIN: &str = include_str!("../../shaders/main.wgsl");
 const SLICES: &str = include_str!("../../shaders/slices.wgsl");
+const GIVEN: &str = include_str!("../../shaders/given.wgsl");
 
 /// The most candidates that a draw tries in one dispatch. At 0 the program has too many bands for any.
 pub(crate) fn attempts_per_dispatch(program: &Program, target: Dialect) -> u32 {
@@ -42,7 +43,7 @@ pub(crate) fn attempts_per_dispatch(program: &Program, target: Dialect) -> u32 {
             let candidate = (1 + has_target) * program.bands() * value;
             // Halves are stored in a loop of two within another.
             let stores = (2 + value) * strides + 2 * has_target * program.bands() * value;
-            (stores, 1 + candidate + program.components().div_ceil(4))
+            (stores, 1 + candidate + program.normals().div_ceil(4))
         }
     };
     let draws = u64::from(draws_per_thread(program, target));
@@ -108,16 +109,23 @@ fn shader_with(
     let draws = draws_per_thread(program, target);
     let sliced = is_sliced(program, target);
     let holds = |word: &str| match word {
-        "sliced" => sliced,
-        "whole" => !sliced,
+        "sliced" | "whole" | "in_slices" | "in_one" | "sliced_given" | "whole_given" => {
+            is_drawn(word, sliced, program)
+        }
+        "given" => program.given > 0,
         "ranged" => indexing == Indexing::Range,
         "listed" => indexing == Indexing::List,
         other => unreachable!("a fragment has a line for shaders that are {other:?}"),
     };
     let mut parts = vec![
         functions(program, &tables, target, sliced, part),
-        kept(PARAMETERS, holds).replace("INDICES_AT", &INDICES_AT.to_string()),
+        kept(PARAMETERS, holds)
+            .replace("INDICES_AT", &INDICES_AT.to_string())
+            .replace("GIVEN_AT", &GIVEN_AT.to_string()),
     ];
+    if program.given > 0 {
+        parts.push(GIVEN.replace("COUNT", &format!("{}u", program.given)));
+    }
     if sliced {
         parts.push(SLICES.replace("PROGRESS_AT", &PROGRESS_AT.to_string()));
     }
@@ -139,6 +147,18 @@ fn shader_with(
     (parts.join("\n"), tables)
 }
 
+/// Whether a line of a fragment is one for draws in one dispatch or in slices, given responses or not.
+fn is_drawn(word: &str, sliced: bool, program: &Program) -> bool {
+    match word {
+        "in_slices" => sliced,
+        "in_one" => !sliced,
+        "sliced" => sliced && program.given == 0,
+        "whole" => !sliced && program.given == 0,
+        "sliced_given" => sliced && program.given > 0,
+        _ => !sliced && program.given > 0,
+    }
+}
+
 /// The functions that make a draw, down to `draw_of`.
 pub(super) fn functions(
     program: &Program,
@@ -148,12 +168,15 @@ pub(super) fn functions(
     part: Option<Part>,
 ) -> String {
     let holds = |word: &str| match word {
-        "sliced" => sliced,
-        "whole" => !sliced,
+        "sliced" | "whole" | "in_slices" | "in_one" | "sliced_given" | "whole_given" => {
+            is_drawn(word, sliced, program)
+        }
+        "given" => program.given > 0,
+        "not_covered" => program.proposal.is_none(),
         "scaled" => program.scales(),
         "own_targets" => program.has_own_targets(),
         "covered" => program.proposal.is_some(),
-        "plain" => program.proposal.is_none(),
+        "plain" => program.proposal.is_none() && program.given == 0,
         other => unreachable!("draw.wgsl has a line for programs that are {other:?}"),
     };
     let draw = kept(DRAW, holds);
