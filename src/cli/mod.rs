@@ -70,7 +70,7 @@ Examples:
   spectroll sample munsell-vrhel -n 1000000 -o reflectances.zarr --zstd
   spectroll verify reflectances.zarr
   spectroll scene --example condition3 --scenes 0..10 -o scenes.npz --preview scenes.png
-  spectroll metamers photo.png -o photo.zarr --dtype f16
+  spectroll sample munsell-vrhel -n 10000 --sensors ss2 --quantities spectra,responses -o cones.npz
   spectroll look mine.csv -o mine.png
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
   spectroll shader granada --quantities linear_srgb --prefix sun > sun.wgsl
