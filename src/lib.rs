@@ -60,6 +60,8 @@ mod pages {
     mod scenes {}
     #[doc = include_str!("../docs/embedding.md")]
     mod embedding {}
+    #[doc = include_str!("../docs/metamers.md")]
+    mod metamers {}
 }
 
 // The program, which other hosts may carry as well, as the Python package does. It names the library as they do.
