@@ -1,5 +1,5 @@
 # Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
-.PHONY: demo test test-python wheel notebook exhaustive faults fuzz mutants bench driver python
+.PHONY: demo test test-swiftshader test-python wheel notebook exhaustive faults fuzz mutants bench driver python
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
@@ -17,6 +17,16 @@ demo:
 test: driver python
 	cargo test --locked --release
 
+# The tests that hold an adapter against the CPU, on a second software Vulkan with a compiler of its own.
+SWIFTSHADER := target/swiftshader/vk_swiftshader_icd.json
+test-swiftshader: driver $(SWIFTSHADER)
+	VK_DRIVER_FILES=$(abspath $(SWIFTSHADER)) VK_ICD_FILENAMES=$(abspath $(SWIFTSHADER)) cargo test --locked --release \
+		--test twins --test quantities --test cover --test lists --test scene --test embedding --test guests
+
+$(SWIFTSHADER): scripts/swiftshader.sh
+	@sh scripts/swiftshader.sh $(dir $@)
+	@touch $@
+
 # The Python package: its wheel, installed into a fresh environment.
 test-python: driver python
 	@sh scripts/wheel.sh $(VENV) target/wheel -m 'not slow'
@@ -32,9 +42,10 @@ notebook:
 	target/wheel/venv/bin/python scripts/notebook.py
 
 # What takes minutes: all 2^32 words through the radius and the circle, the statistics under 200 seeds, and the fit on
-# 100,000 matrices and 1,000 small files, and draws on clusters of Dask and Ray.
+# 100,000 matrices and 1,000 small files, a million draws of each kind on devices that take every liberty, and draws on
+# clusters of Dask and Ray.
 exhaustive: python
-	cargo test --locked --release --lib --test statistics --test fit -- --ignored --nocapture
+	cargo test --locked --release --lib --test statistics --test fit --test adversary -- --ignored --nocapture
 	test -d target/wheel/venv || $(MAKE) test-python
 	target/wheel/venv/bin/python -m pip install --quiet -r python/tests/requirements-slow.txt
 	target/wheel/venv/bin/python -m pytest -q -m slow

@@ -1,4 +1,4 @@
-// The standard normals of an attempt, for a program that runs in loops.
+// The standard normals of an attempt.
 fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Normals {
     var z: Normals;
     for (var block = 0u; block < BLOCKS; block++) {

@@ -1,4 +1,6 @@
-// What a dispatch draws; src/sampler.rs writes it.
+//! src/wgsl/compute_shader.rs writes it.
+
+// What a dispatch draws.
 struct Parameters {
     key: vec2<u32>,
     first: vec2<u32>,
@@ -10,8 +12,10 @@ struct Parameters {
     plane: u32,
     // How many draws a row has; 0 where there are no rows.
     row: u32,
-    // The most candidates of a draw in one dispatch. // if in_slices
-    slice: u32, // if in_slices
+    // The most candidates of a draw in one dispatch. // if sliced
+    slice: u32, // if sliced
+    // Always 0, which no compiler knows. // if exact
+    @align(8) zero: u32, // if exact
 }
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
@@ -29,14 +33,12 @@ fn draw_at(i: u32) -> Draw {
     if parameters.row != 0u { // if ranged
         index = vec2(low % parameters.row, parameters.first.y + low / parameters.row); // if ranged
     } // if ranged
-    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts); // if whole
-    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts, given_at(i)); // if whole_given
-    let before = progress[i]; // if in_slices
-    let attempts = attempts_of(before); // if in_slices
-    let first = select(before & ~UNDONE, attempts - 1u, attempts != 0u); // if in_slices
-    let end = select(min(first + parameters.slice, parameters.max_attempts), attempts, attempts != 0u); // if in_slices
-    let drawn = draw_of(parameters.key, index, parameters.stream, first, end); // if sliced
-    let drawn = draw_of(parameters.key, index, parameters.stream, first, end, given_at(i)); // if sliced_given
-    progress[i] = select(drawn.tried | UNDONE, drawn.attempts, drawn.attempts != 0u); // if in_slices
-    return drawn; // if in_slices
+    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts GIVEN_ARGUMENT); // if whole
+    let before = progress[i]; // if sliced
+    let attempts = attempts_of(before); // if sliced
+    let first = select(before & ~UNDONE, attempts - 1u, attempts != 0u); // if sliced
+    let end = select(min(first + parameters.slice, parameters.max_attempts), attempts, attempts != 0u); // if sliced
+    let drawn = draw_of(parameters.key, index, parameters.stream, first, end GIVEN_ARGUMENT); // if sliced
+    progress[i] = select(drawn.tried | UNDONE, drawn.attempts, drawn.attempts != 0u); // if sliced
+    return drawn; // if sliced
 }

@@ -1,5 +1,6 @@
+//! CPU twin: src/random/philox.rs. `mul_wide` comes from the fragment of its name, in one of two forms.
+
 // Philox4x32-10 (Salmon, Moraes, Dror & Shaw 2011): a pure function of (counter, key).
-// CPU twin: src/philox.rs. `mul_wide` comes from the fragment of its name, in one of two forms.
 
 fn philox_round(c: vec4<u32>, key: vec2<u32>) -> vec4<u32> {
     let a = mul_wide(0xD2511F53u, c.x);
@@ -7,7 +8,7 @@ fn philox_round(c: vec4<u32>, key: vec2<u32>) -> vec4<u32> {
     return vec4(b.y ^ c.y ^ key.x, b.x, a.y ^ c.w ^ key.y, a.x);
 }
 
-// Written out rather than looped: a loop would carry the bound checks that WGSL compilers add.
+//! Written out rather than looped: a loop would carry the bound checks that WGSL compilers add.
 fn philox(counter: vec4<u32>, key: vec2<u32>) -> vec4<u32> {
     let weyl = vec2(0x9E3779B9u, 0xBB67AE85u);
     var c = philox_round(counter, key);

@@ -78,8 +78,8 @@ pub use dataset::{
 };
 pub use draw_status::DrawStatus;
 pub use engine::{
-    Adapter, Batch, DrawSummary, Engine, EngineChoice, EngineError, Session, WantedAdapter, adapters,
-    wanted_backends,
+    Adapter, ArithmeticChoice, ArithmeticVerdict, Batch, DrawSummary, Engine, EngineChoice, EngineError,
+    Probe, ProbedAdapter, Session, WantedAdapter, adapters, probe, probed_adapters, wanted_backends,
 };
 pub use grid::{Extrapolation, Grid, GridError};
 pub use metamers::{
@@ -96,9 +96,12 @@ pub use recipe::{
     CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder, RecipeError,
     RecipeSettings, ResponseTarget, ScalarSampler, XyzScale,
 };
-pub use sampler::{Prepared, Sampler, SamplerError};
+pub use sampler::{PrepareOptions, Prepared, Sampler, SamplerError, SamplerOptions};
 pub use sensors::{MAX_SENSORS, ResponseScale, SensorError, Sensors};
 pub use threads::ThreadError;
 // What stands in signatures, so that hosts take the same versions.
-pub use wgsl::WgslError;
+pub use wgsl::{
+    Arithmetic, ArithmeticTrait, Binding, BindingRole, ComputeShader, Dialect, Indexing, ModuleOptions,
+    ShaderVariant, TableStorage, WgslError,
+};
 pub use {half, nalgebra, rand, wgpu};

@@ -25,7 +25,8 @@ pub(crate) fn pool(threads: Option<NonZeroUsize>) -> Result<ThreadPool, ThreadEr
     pool.map_err(|e| ThreadError(e.to_string()))
 }
 
-fn cores() -> usize {
+/// Number of cores that the operating system gives.
+pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 

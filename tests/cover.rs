@@ -2,7 +2,7 @@
 
 mod engines;
 
-use engines::{cpu, gpu, gpu_is_software, surfaces};
+use engines::{cpu, forms, gpu_is_software, surfaces};
 use spectroll::{
     Bounds, DrawRange, DrawStatus, Engine, EngineError, ProposalKind, Quantity, Recipe, RecipeBuilder,
     RecipeError, Stream, colorimetry,
@@ -52,8 +52,10 @@ fn extremes_are_covered_and_physical_and_the_same_on_every_engine() {
         assert!(recipe.acceptance() > 0.1 && error < 0.06, "{name}: {} {error}", recipe.acceptance());
         assert!(recipe.cover().is_some_and(|cover| cover.bytes <= 256 << 10));
         let draws = Stream::named(40, &name).draws((1 << 32) - 77..(1 << 32) - 77 + COUNT);
-        let (ours, theirs) = (rows(cpu(), &recipe, draws), rows(gpu(), &recipe, draws));
-        assert!(!software || ours == theirs, "{name}");
+        let ours = rows(cpu(), &recipe, draws);
+        for engine in forms() {
+            assert!(!software || ours == rows(engine, &recipe, draws), "{name}, {:?}", engine.verdict());
+        }
         let mut attempts = 0;
         for (i, (spectrum, status)) in ours.0.chunks_exact(31).zip(&ours.1).enumerate() {
             assert!(spectrum.iter().all(|&s| s > 0.0 && s < 1.0), "{name}: draw {i}");
@@ -146,6 +148,4 @@ fn what_cannot_be_covered_says_why() {
     assert!(matches!((a, b), (RecipeError::Lrv(_), RecipeError::Lrv(_))));
     let hopeless = surfaces().covariance_scale(1e4).proposal(ProposalKind::Plain).build().unwrap_err();
     assert!(matches!(hopeless, RecipeError::Hopeless { .. }), "{hopeless}");
-    let module = near_white(0.99).build().expect("it can be drawn").wgsl("wall").unwrap_err();
-    assert!(module.to_string().contains("needs a buffer"), "{module}");
 }

@@ -2,7 +2,13 @@
 
 use std::io::Write;
 
+use serde::Serialize;
+use spectroll::{Adapter, EngineError, Probe};
+
 /// List the graphics adapters of this machine
+///
+/// Each is opened and tried: whether its draws have the bytes of the CPU, in plain arithmetic or in exact arithmetic, which
+/// is slower, and what its compiler does with sums and products.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// Print the list as JSON
@@ -10,19 +16,49 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+/// An adapter, and what came of its trial.
+#[derive(Serialize)]
+struct Listed<'a> {
+    #[serde(flatten)]
+    adapter: &'a Adapter,
+    /// `None` where it could not be tried.
+    #[serde(flatten)]
+    probe: Option<&'a Probe>,
+    /// Reason for which it could not be tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
+}
+
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let adapters = spectroll::adapters()?;
+    let adapters = spectroll::probed_adapters()?;
     let mut out = std::io::stdout();
     if arguments.json {
-        writeln!(out, "{}", serde_json::to_string_pretty(&adapters)?)?;
+        let listed = |(adapter, probe): &'_ (Adapter, Result<Probe, EngineError>)| -> serde_json::Value {
+            let error = probe.as_ref().err().map(ToString::to_string);
+            serde_json::json!(Listed { adapter, probe: probe.as_ref().ok(), error })
+        };
+        writeln!(out, "{}", serde_json::to_string_pretty(&adapters.iter().map(listed).collect::<Vec<_>>())?)?;
         return Ok(());
     }
-    for (index, adapter) in adapters.iter().enumerate() {
+    for (index, (adapter, probe)) in adapters.iter().enumerate() {
         writeln!(out, "{index}: {adapter}")?;
+        match probe {
+            Ok(probe) => writeln!(out, "   {}", sentence(probe))?,
+            Err(error) => writeln!(out, "   cannot be tried: {error}")?,
+        }
     }
     if adapters.is_empty() {
         writeln!(out, "no graphics adapter; a Vulkan driver gives one (Debian: mesa-vulkan-drivers)")?;
     }
     writeln!(out, "-: CPU, with --engine cpu")?;
     Ok(())
+}
+
+/// The verdict on an adapter, and the traits of its arithmetic.
+fn sentence(probe: &Probe) -> String {
+    let traits: Vec<_> = probe.traits.iter().map(|(found, _)| found.name()).collect();
+    match traits.is_empty() {
+        true => probe.verdict.to_string(),
+        false => format!("{} ({})", probe.verdict, traits.join(", ")),
+    }
 }

@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     interrupt::watch();
     let mut all = Measured::default();
     for choice in choices {
-        let engine = Engine::with_threads(&choice, arguments.engine.threads)?;
+        let engine = arguments.engine.open_as(&choice)?;
         if arguments.costs && !arguments.json {
             writeln!(std::io::stdout(), "{engine}, million draws a second:")?;
         }

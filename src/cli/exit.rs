@@ -61,6 +61,7 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
 fn of_engine(error: &EngineError) -> u8 {
     match error {
         EngineError::NoAdapter { .. } | EngineError::NoAdapters | EngineError::UnknownBackend { .. } => 3,
+        EngineError::Differs { .. } => 5,
         _ => 1,
     }
 }
@@ -149,7 +150,22 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
     if matches!(error.downcast_ref(), Some(ModelError::BuiltinRange { .. })) {
         return " (--wavelengths; `spectroll fit` takes other data)";
     }
-    if matches!(error.downcast_ref(), Some(EngineError::NoAdapters)) { " (--engine cpu)" } else { "" }
+    if matches!(error.downcast_ref(), Some(WgslError::LargeTable { .. })) {
+        return " (--tables buffer)";
+    }
+    let engine = error.downcast_ref::<EngineError>().or(match error.downcast_ref::<ExportError>() {
+        Some(ExportError::Engine(error)) => Some(error),
+        Some(ExportError::Unfinished { cause, .. }) => match &**cause {
+            ExportError::Engine(error) => Some(error),
+            _ => None,
+        },
+        _ => None,
+    });
+    match engine {
+        Some(EngineError::NoAdapters) => " (--engine cpu)",
+        Some(EngineError::Differs { .. }) => " (--engine cpu, or --arithmetic exact)",
+        _ => "",
+    }
 }
 
 /// The option that does what the message of an error of data advises, and the command that shows how a file was read.

@@ -55,6 +55,12 @@ pub(super) fn factor(text: &str) -> Result<f64, String> {
     text.parse().map_err(|_| "expected a number, as in 1.5".to_owned())
 }
 
+/// A share of something.
+pub(super) fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|share| (0.0..=1.0).contains(share));
+    share.ok_or_else(|| "expected a share from 0 to 1".to_owned())
+}
+
 /// A whole number between two others.
 pub(super) fn between<const LOW: u64, const HIGH: u64>(text: &str) -> Result<u32, String> {
     let number = text.parse().ok().filter(|&number| (LOW..=HIGH).contains(&u64::from(number)));
@@ -127,6 +133,10 @@ mod tests {
         assert_eq!((attempts("1e6"), between::<1, 22>("22")), (Ok(1_000_000), Ok(22)));
         for text in ["-1", "many", "4294967296"] {
             assert_eq!(attempts(text).unwrap_err(), "expected a whole number from 1 to 2^31 - 1");
+        }
+        assert_eq!((share("1e-4"), share("1")), (Ok(1e-4), Ok(1.0)));
+        for text in ["-0.1", "1.1", "nan", "all"] {
+            assert_eq!(share(text).unwrap_err(), "expected a share from 0 to 1");
         }
         for text in ["-1", "0", "23", "most"] {
             assert_eq!(between::<1, 22>(text).unwrap_err(), "expected a whole number from 1 to 22");

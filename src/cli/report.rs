@@ -58,6 +58,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.engine.threads.is_some() {
         return Err(Usage("a report uses all cores: leave out --threads".to_owned()).into());
     }
+    if arguments.engine.checks_or_chooses_arithmetic() {
+        let text = "a report tries each adapter as it is: leave out --arithmetic and --verify-draws";
+        return Err(Usage(text.to_owned()).into());
+    }
     // Only to learn now whether it can be made: a second Ctrl-C leaves nothing behind.
     let folder = || PendingFolder::create(&arguments.output, if_exists(arguments.force), REPORT);
     drop(folder()?);

@@ -8,7 +8,9 @@ use serde::Serialize;
 use spectroll::export::{DrawExport, Output, Writing};
 use spectroll::output::SetStatus;
 use spectroll::wording::counted;
-use spectroll::{DrawRange, DrawSummary, EngineChoice, Grid, Model, Stream, wanted_backends};
+use spectroll::{
+    ArithmeticVerdict, DrawRange, DrawSummary, EngineChoice, Grid, Model, Stream, wanted_backends,
+};
 
 use super::exit::Usage;
 use super::options::{EngineArguments, OutputArguments, Purpose, RecipeArguments};
@@ -79,6 +81,11 @@ struct Report {
     seconds: f64,
     draws_per_second: f64,
     engine: String,
+    /// Arithmetic of an adapter's shaders, and whether its draws are those of the CPU.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    arithmetic: Option<ArithmeticVerdict>,
+    /// Number of draws that were made again on the CPU, and were the same.
+    rechecked: u64,
     /// The engine, with why it is not another one only where a variable is to blame.
     #[serde(skip)]
     drawn_by: String,
@@ -150,7 +157,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             seconds,
             draws_per_second: summary.draws as f64 / seconds,
             engine: format!("{engine}{why}"),
-            drawn_by: if hidden.is_empty() { engine.to_string() } else { format!("{engine}{why}") },
+            arithmetic: engine.verdict(),
+            rechecked: engine.rechecked(),
+            drawn_by: run::drawn_by(&engine) + if hidden.is_empty() { "" } else { &why },
             version: env!("CARGO_PKG_VERSION"),
         },
     )
@@ -181,6 +190,9 @@ fn report(
             _ => format!("{:.2} million a second, ", made.draws_per_second / 1e6),
         };
         tell!("  {:.2} s, {rate}{}", made.seconds, made.drawn_by);
+        if let Some(rechecked) = run::rechecked(made.rechecked) {
+            tell!("  {rechecked}");
+        }
         if let Some(status) = run::status(output, outcome) {
             tell!("  {status}");
         }

@@ -12,7 +12,7 @@ use spectroll::output::{OutputError, PendingFile, Schema, SetStatus};
 use spectroll::plain_file::read_text;
 use spectroll::scene::{GroupSummary, MAX_FILE_BYTES, PRESETS, Scene, Workload};
 use spectroll::wording::{counted, grouped};
-use spectroll::{Dtype, Engine, Quantity};
+use spectroll::{ArithmeticVerdict, Dtype, Engine, Quantity};
 
 use super::exit::Usage;
 use super::interrupt;
@@ -85,6 +85,14 @@ struct Report {
     seconds: f64,
     scenes_per_second: f64,
     engine: String,
+    /// Arithmetic of an adapter's shaders, and whether its draws are those of the CPU.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    arithmetic: Option<ArithmeticVerdict>,
+    /// Number of draws that were made again on the CPU, and were the same.
+    rechecked: u64,
+    /// The engine, with its arithmetic.
+    #[serde(skip)]
+    drawn_by: String,
     version: &'static str,
     /// Room on disk, in a dry run of what would be written.
     #[serde(flatten)]
@@ -314,7 +322,10 @@ impl Job<'_> {
                 }
             }
             self.tell_seed();
-            tell!("  {seconds:.2} s, {}", report.engine);
+            tell!("  {seconds:.2} s, {}", report.drawn_by);
+            if let Some(rechecked) = run::rechecked(report.rechecked) {
+                tell!("  {rechecked}");
+            }
             if let Some(status) = run::status(output, outcome) {
                 tell!("  {status}");
             }
@@ -351,6 +362,9 @@ impl Job<'_> {
             seconds: 0.0,
             scenes_per_second: 0.0,
             engine: engine.to_string(),
+            arithmetic: engine.verdict(),
+            rechecked: engine.rechecked(),
+            drawn_by: run::drawn_by(engine),
             version: env!("CARGO_PKG_VERSION"),
             room: None,
         }

@@ -79,6 +79,13 @@ pub fn linear_srgb_to_xyz(linear: [f64; 3]) -> [f64; 3] {
 }
 
 /// 8-bit sRGB from linear components (IEC 61966-2-1), which are clamped to 0..1.
+///
+/// ```
+/// use spectroll::colorimetry::encode_srgb;
+///
+/// assert_eq!(encode_srgb([0.001, 0.21586, 0.5]), [3, 128, 188]);
+/// assert_eq!(encode_srgb([-1.0, 0.0, 2.0]), [0, 0, 255]);
+/// ```
 pub fn encode_srgb(linear: [f64; 3]) -> [u8; 3] {
     linear.map(|v| {
         let v = v.clamp(0.0, 1.0);

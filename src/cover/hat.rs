@@ -93,7 +93,7 @@ mod tests {
     use statrs::distribution::{ContinuousCDF, Normal};
 
     use super::*;
-    use crate::random::real::Arithmetic;
+    use crate::random::real::DrawOperations;
 
     const INTERVALS: [(f64, f64); 12] = [
         (-13.0, 13.0),

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::exactness::{self, Probe};
+use super::gpu::Gpu;
 use super::{EngineError, WantedAdapter};
 
 /// A graphics adapter, as its driver describes itself.
@@ -29,7 +31,10 @@ impl fmt::Display for Adapter {
 
 impl Adapter {
     pub(super) fn of(adapter: &wgpu::Adapter) -> Adapter {
-        let info = adapter.get_info();
+        Adapter::new(adapter.get_info(), adapter.features().contains(wgpu::Features::SHADER_INT64))
+    }
+
+    pub(super) fn new(info: wgpu::AdapterInfo, int64: bool) -> Adapter {
         let kind = match info.device_type {
             wgpu::DeviceType::DiscreteGpu => "discrete",
             wgpu::DeviceType::IntegratedGpu => "integrated",
@@ -42,7 +47,7 @@ impl Adapter {
             backend: info.backend.to_string(),
             kind: kind.to_owned(),
             driver: [info.driver, info.driver_info].join(" ").trim().to_owned(),
-            int64: adapter.features().contains(wgpu::Features::SHADER_INT64),
+            int64,
         }
     }
 }
@@ -54,6 +59,18 @@ const BACKEND: &str = "WGPU_BACKEND";
 /// counts them. The variable `WGPU_BACKEND` limits them to some interfaces; an error says where it names none.
 pub fn adapters() -> Result<Vec<Adapter>, EngineError> {
     Ok(enumerate()?.iter().map(Adapter::of).collect())
+}
+
+/// An adapter, and its probe or the error that says why it could not be opened.
+pub type ProbedAdapter = (Adapter, Result<Probe, EngineError>);
+
+/// Lists the adapters of this machine as [`adapters`] does, each with its [`probe`](super::probe()), for which it is opened:
+/// a matter of a second each. An adapter that cannot be opened has the error that says why.
+pub fn probed_adapters() -> Result<Vec<ProbedAdapter>, EngineError> {
+    let probed = |adapter: wgpu::Adapter| {
+        (Adapter::of(&adapter), Gpu::open(adapter).and_then(|gpu| exactness::of(&gpu)))
+    };
+    Ok(enumerate()?.into_iter().map(probed).collect())
 }
 
 /// The value of a variable; `None` also where that is empty, which shells make of one that is to be unset.

@@ -6,11 +6,12 @@ use std::time::Instant;
 
 use wgpu::{BufferUsages, Features, PollType};
 
+use super::exactness::{self, ArithmeticChoice, ArithmeticVerdict};
 use super::schedule::{Job, Pace, Window};
 use super::{Adapter, Batch, EngineError};
 use crate::quantity::Quantity;
 use crate::random::stream::{DrawRange, Draws};
-use crate::sampler::{Prepared, Sampler};
+use crate::sampler::{PrepareOptions, Prepared, Sampler};
 use crate::wgsl::Indexing;
 
 /// Number of windows in flight: one with the caller, one being computed, one waiting to be.
@@ -26,6 +27,18 @@ pub(super) struct Gpu {
     shared_memory: bool,
     /// The first error that the device reported outside of any call.
     fault: Arc<Mutex<Option<String>>>,
+    /// Arithmetic in which it draws.
+    pub(super) arithmetic: ArithmeticChoice,
+    /// Share of the windows that are made again on the CPU.
+    pub(super) recheck: f64,
+    record: Mutex<Record>,
+}
+
+/// Record of the draws of a device.
+#[derive(Debug, Default)]
+struct Record {
+    verdict: Option<ArithmeticVerdict>,
+    rechecked: u64,
 }
 
 impl Gpu {
@@ -60,14 +73,52 @@ impl Gpu {
             }
         });
         let shared_memory = features.contains(Features::MAPPABLE_PRIMARY_BUFFERS);
-        Ok(Gpu { adapter: description, device, queue, shared_memory, fault })
+        let gpu = Gpu::of(description, device, queue);
+        Ok(Gpu { shared_memory, fault, ..gpu })
+    }
+
+    fn of(adapter: Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Gpu {
+        Gpu {
+            adapter,
+            device,
+            queue,
+            shared_memory: false,
+            fault: Arc::default(),
+            arithmetic: ArithmeticChoice::default(),
+            recheck: 0.0,
+            record: Mutex::default(),
+        }
+    }
+
+    /// A host's device, whose errors are the host's.
+    pub(super) fn of_host(device: &wgpu::Device, queue: &wgpu::Queue) -> Gpu {
+        let int64 = device.features().contains(Features::SHADER_INT64);
+        Gpu::of(Adapter::new(device.adapter_info(), int64), device.clone(), queue.clone())
+    }
+
+    /// Notes the verdict on a pipeline that is to draw.
+    fn note_verdict(&self, verdict: ArithmeticVerdict) {
+        let mut record = self.record.lock().expect("no holder panics");
+        record.verdict = Some(record.verdict.map_or(verdict, |before| before.and(verdict)));
+    }
+
+    /// Notes draws that were made again on the CPU.
+    pub(super) fn note_rechecked(&self, draws: u64) {
+        self.record.lock().expect("no holder panics").rechecked += draws;
+    }
+
+    pub(super) fn verdict(&self) -> Option<ArithmeticVerdict> {
+        self.record.lock().expect("no holder panics").verdict
+    }
+
+    pub(super) fn rechecked(&self) -> u64 {
+        self.record.lock().expect("no holder panics").rechecked
     }
 
     pub(super) fn adapter(&self) -> &Adapter {
         &self.adapter
     }
 
-    #[cfg(any(test, feature = "report"))]
     pub(super) fn device(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.device, &self.queue)
     }
@@ -100,7 +151,7 @@ impl Gpu {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("spectroll") })
     }
 
-    fn error(&self, reason: String) -> EngineError {
+    pub(super) fn error(&self, reason: String) -> EngineError {
         EngineError::Gpu { adapter: self.adapter.to_string(), reason }
     }
 }
@@ -126,22 +177,40 @@ struct ReadyJob {
 
 impl<'a> GpuSchedule<'a> {
     pub(super) fn new(gpu: &'a Gpu, jobs: &[Job], indexing: Indexing) -> Result<Self, EngineError> {
-        let mut roles: Vec<ReadyJob> = Vec::new();
+        let mut samplers: Vec<Sampler> = Vec::new();
         for (i, job) in jobs.iter().enumerate() {
             let program = job.recipe.program();
-            let sampler = match jobs[..i].iter().position(|other| other.recipe.program() == program) {
-                Some(other) => roles[other].sampler.clone(),
-                None => Sampler::indexed(&gpu.device, &program.with_status(), indexing)?,
-            };
-            roles.push(ReadyJob { sampler, per_step: job.per_step });
+            samplers.push(match jobs[..i].iter().position(|other| other.recipe.program() == program) {
+                Some(other) => samplers[other].clone(),
+                None => {
+                    let (sampler, verdict) = exactness::sampler(gpu, job.recipe, indexing, gpu.arithmetic)?;
+                    gpu.note_verdict(verdict);
+                    sampler
+                }
+            });
         }
+        GpuSchedule::of_samplers(gpu, jobs, samplers)
+    }
+
+    /// Schedule of jobs whose shaders are compiled.
+    pub(super) fn of_samplers(
+        gpu: &'a Gpu,
+        jobs: &[Job],
+        samplers: Vec<Sampler>,
+    ) -> Result<Self, EngineError> {
+        let ready = |(job, sampler): (&Job, Sampler)| ReadyJob { sampler, per_step: job.per_step };
+        let roles: Vec<_> = jobs.iter().zip(samplers).map(ready).collect();
         let limits = gpu.device.limits();
         let most = roles.iter().map(|role| role.sampler.max_count(&limits) / role.per_step).min();
         let most = most.expect("an ensemble has jobs");
-        let single = |job: &Job| GpuSchedule::new(gpu, &[Job { per_step: 1, ..*job }], indexing);
+        let single = |(job, ready): (&Job, &ReadyJob)| {
+            GpuSchedule::of_samplers(gpu, &[Job { per_step: 1, ..*job }], vec![ready.sampler.clone()])
+        };
         let is_too_large = most == 0 && jobs.iter().any(|job| job.per_step > 1);
-        let parts =
-            if is_too_large { jobs.iter().map(single).collect::<Result<_, _>>()? } else { Vec::new() };
+        let parts = match is_too_large {
+            true => jobs.iter().zip(&roles).map(single).collect::<Result<_, _>>()?,
+            false => Vec::new(),
+        };
         let pace = Pace::new(jobs, roles.iter().map(|role| role.sampler.formats()), most);
         Ok(GpuSchedule { gpu, jobs: roles, pace, slots: Vec::new(), capacity: 0, parts })
     }
@@ -266,9 +335,10 @@ struct Flight {
 
 impl Slot {
     fn new(gpu: &Gpu, jobs: &[ReadyJob], draws: &[Draws], window: Window) -> Result<Slot, EngineError> {
-        let usage = if gpu.shared_memory { BufferUsages::MAP_READ } else { BufferUsages::COPY_SRC };
+        let usages = if gpu.shared_memory { BufferUsages::MAP_READ } else { BufferUsages::COPY_SRC };
+        let options = PrepareOptions { usages, ..PrepareOptions::default() };
         let prepare = |(job, draws): (&ReadyJob, &Draws)| {
-            job.sampler.prepare_for(&gpu.device, window.of(*draws, job.per_step).range, usage)
+            job.sampler.prepare_slices(&gpu.device, window.of(*draws, job.per_step).range, &options)
         };
         let prepared = jobs.iter().zip(draws).map(prepare).collect::<Result<Vec<_>, _>>()?;
         let copy = |buffer: &wgpu::Buffer| {
@@ -287,7 +357,7 @@ impl Slot {
     fn submit(mut self, gpu: &Gpu, draws: Vec<Draws>) -> Flight {
         let mut encoder = gpu.encoder();
         for (prepared, draws) in self.prepared.iter_mut().zip(&draws) {
-            prepared.set_draws(&gpu.queue, draws.range).expect("a window has no more steps than a slot");
+            prepared.set_window(&gpu.queue, draws.range).expect("a window has no more steps than a slot");
             prepared.set_indices(&gpu.queue, *draws);
             prepared.set_given(&gpu.queue, *draws);
             prepared.record_first(&mut encoder);

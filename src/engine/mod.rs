@@ -6,7 +6,9 @@ mod adapter;
 #[cfg(any(test, feature = "report"))]
 pub(crate) mod compute;
 mod cpu;
+mod exactness;
 mod gpu;
+mod reference;
 mod schedule;
 mod session;
 
@@ -19,7 +21,8 @@ use half::f16;
 use serde::Serialize;
 
 use adapter::Wanted;
-pub use adapter::{Adapter, adapters, wanted_backends};
+pub use adapter::{Adapter, ProbedAdapter, adapters, probed_adapters, wanted_backends};
+pub use exactness::{ArithmeticChoice, ArithmeticVerdict, Probe, probe};
 pub(crate) use schedule::{Job, Schedule};
 pub use session::Session;
 
@@ -33,8 +36,8 @@ use crate::threads::{self, ThreadError};
 /// Choice of where to draw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum EngineChoice {
-    /// On the best hardware adapter, and on the CPU where there is none: software Vulkan gives the same draws, but
-    /// slower.
+    /// On the best hardware adapter, and on the CPU where there is none, or none that has the CPU's draws: software
+    /// Vulkan gives the same draws, but slower.
     #[default]
     Auto,
     /// On the best adapter, hardware before software.
@@ -62,6 +65,11 @@ pub enum EngineError {
     UnknownBackend { value: String },
     #[error("adapter {adapter}: {reason}")]
     Gpu { adapter: String, reason: String },
+    #[error(
+        "adapter {adapter}: the {quantity} of draw {index} are not those of the CPU: draw on the CPU, or in exact \
+         arithmetic"
+    )]
+    Differs { adapter: String, index: u64, quantity: Quantity },
     #[error(transparent)]
     Threads(#[from] ThreadError),
     #[error(transparent)]
@@ -265,11 +273,62 @@ impl Engine {
                 Some(adapter::find(WantedAdapter { name: wanted.clone(), is_from_variable: false })?)
             }
         };
-        let device = match adapter {
-            Some(adapter) => Device::Gpu(gpu::Gpu::open(adapter)?),
-            None => Device::Cpu(cpu::Threads::new(threads)?),
-        };
-        Ok(Engine { device })
+        if let Some(adapter) = adapter {
+            let gpu = gpu::Gpu::open(adapter)?;
+            let is_right =
+                *choice != EngineChoice::Auto || exactness::standard(&gpu, ArithmeticChoice::Auto)?.is_exact;
+            if is_right {
+                return Ok(Engine { device: Device::Gpu(gpu) });
+            }
+        }
+        Ok(Engine { device: Device::Cpu(cpu::Threads::new(threads)?) })
+    }
+
+    /// Sets the arithmetic in which an adapter draws ([`ArithmeticChoice::Auto`]). The CPU has but one.
+    pub fn with_arithmetic(mut self, choice: ArithmeticChoice) -> Engine {
+        if let Device::Gpu(gpu) = &mut self.device {
+            gpu.arithmetic = choice;
+        }
+        self
+    }
+
+    /// Makes a share of the windows of an adapter, at least the first of each session, again on the CPU, and ends with
+    /// [`EngineError::Differs`] where a byte differs. The share is between 0, which checks none, and 1 (0).
+    pub fn with_recheck(mut self, share: f64) -> Engine {
+        if let Device::Gpu(gpu) = &mut self.device {
+            gpu.recheck = share;
+        }
+        self
+    }
+
+    /// Form of arithmetic of the sessions so far, and whether their draws are those of the CPU, by the trial that each
+    /// began with; the lesser of several. `None` on the CPU, and before the first.
+    pub fn verdict(&self) -> Option<ArithmeticVerdict> {
+        match &self.device {
+            Device::Gpu(gpu) => gpu.verdict(),
+            Device::Cpu(_) => None,
+        }
+    }
+
+    /// Number of draws that were made again on the CPU, and were the same. See [`Engine::with_recheck`].
+    pub fn rechecked(&self) -> u64 {
+        match &self.device {
+            Device::Gpu(gpu) => gpu.rechecked(),
+            Device::Cpu(_) => 0,
+        }
+    }
+
+    /// Whether all draws so far are those of the CPU.
+    pub fn is_exact(&self) -> bool {
+        self.verdict().is_none_or(|verdict| verdict.is_exact)
+    }
+
+    #[cfg(test)]
+    fn gpu(&self) -> Option<&gpu::Gpu> {
+        match &self.device {
+            Device::Gpu(gpu) => Some(gpu),
+            Device::Cpu(_) => None,
+        }
     }
 
     /// Adapter that draws; `None` on the CPU.

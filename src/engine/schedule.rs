@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::reference::Recheck;
 use super::{Batch, Device, Engine, EngineError, cpu, gpu};
 use crate::quantity::ArrayFormat;
 use crate::random::stream::Draws;
@@ -24,10 +25,18 @@ impl Engine {
     /// Prepares to make draws whose indices are given in this way. On the CPU that makes no difference.
     pub(super) fn schedule_of(&self, jobs: &[Job], indexing: Indexing) -> Result<Schedule<'_>, EngineError> {
         Ok(Schedule(match &self.device {
-            Device::Gpu(gpu) => Backend::Gpu(gpu::GpuSchedule::new(gpu, jobs, indexing)?),
+            Device::Gpu(gpu) => {
+                let recheck = (gpu.recheck > 0.0).then(|| (gpu, recheck(jobs, gpu.recheck)));
+                Backend::Gpu(gpu::GpuSchedule::new(gpu, jobs, indexing)?, recheck)
+            }
             Device::Cpu(threads) => Backend::Cpu(cpu::CpuSchedule::new(threads, jobs)),
         }))
     }
+}
+
+/// Makes the check that makes windows of jobs again.
+fn recheck(jobs: &[Job], share: f64) -> Recheck {
+    Recheck::new(jobs.iter().map(|job| job.recipe), share)
 }
 
 /// A recipe among several that are drawn together, step by step.
@@ -42,7 +51,8 @@ pub(crate) struct Job<'a> {
 pub(crate) struct Schedule<'a>(pub(super) Backend<'a>);
 
 pub(super) enum Backend<'a> {
-    Gpu(gpu::GpuSchedule<'a>),
+    /// With what makes some windows again, where that was asked for.
+    Gpu(gpu::GpuSchedule<'a>, Option<(&'a gpu::Gpu, Recheck)>),
     Cpu(cpu::CpuSchedule<'a>),
 }
 
@@ -57,7 +67,14 @@ impl Schedule<'_> {
     ) -> Result<(), E> {
         match &mut self.0 {
             _ if steps == 0 => Ok(()),
-            Backend::Gpu(session) => session.draw(draws, steps, &mut sink),
+            Backend::Gpu(session, None) => session.draw(draws, steps, &mut sink),
+            Backend::Gpu(session, Some((gpu, recheck))) => {
+                session.draw(draws, steps, &mut |batches: &[Batch]| {
+                    let adapter = gpu.adapter().to_string();
+                    gpu.note_rechecked(recheck.check(batches, draws, &adapter)?);
+                    sink(batches)
+                })
+            }
             Backend::Cpu(session) => session.draw(draws, steps, &mut sink),
         }
     }

@@ -16,7 +16,7 @@ use crate::random::stream::Stream;
 use crate::recipe::{Recipe, RecipeError};
 use crate::sampler::{Prepared, Sampler};
 pub use crate::wgsl::Part;
-use crate::wgsl::{Indexing, shader_without};
+use crate::wgsl::{ComputeShader, ShaderVariant, shader_without};
 
 /// Draws per dispatch. Their spectra stay below the least size of a buffer that a device may offer.
 const COUNT: u64 = 1 << 19;
@@ -123,9 +123,10 @@ fn never_rejected(model: &Model) -> Result<Program, RecipeError> {
 
 /// Makes the sampler of a program without a part.
 fn sampler(device: &Device, program: &Program, part: Option<Part>) -> Result<Sampler, EngineError> {
-    let target = Sampler::target(device);
-    let (text, tables) = shader_without(program, target, part);
-    Ok(Sampler::with_text(device, program, target, (text, Indexing::Range), &tables)?)
+    let variant = ShaderVariant { dialect: Sampler::dialect(device), ..ShaderVariant::default() };
+    let (text, tables) = shader_without(program, variant, part);
+    let shader = ComputeShader::with_text(program, variant, text, &tables.values);
+    Ok(Sampler::with_shader(device, shader.expect("it has the bands of a model"), None)?)
 }
 
 #[cfg(test)]
@@ -144,7 +145,8 @@ mod tests {
     #[test]
     fn each_shader_is_valid_and_lacks_its_part_alone() {
         let program = never_rejected(&model()).unwrap();
-        for target in [Dialect::Baseline, Dialect::Int64, Dialect::SoftwareInt64] {
+        for dialect in [Dialect::Baseline, Dialect::Int64, Dialect::SoftwareInt64] {
+            let target = ShaderVariant { dialect, ..ShaderVariant::default() };
             let whole = shader_without(&program, target, None).0;
             for part in Part::ALL {
                 let text = shader_without(&program, target, Some(part)).0;
@@ -153,7 +155,7 @@ mod tests {
                 validator.validate(&module).unwrap_or_else(|e| panic!("{part:?}: {e}"));
                 for (of, mark) in [
                     (Part::Philox, "c = philox_round(c, key"),
-                    (Part::Normals, "return radius(x) * circle(y)"),
+                    (Part::Normals, "return vec2(r * c.x, r * c.y)"),
                     (Part::Reconstruction, " * z[0] + "),
                     (Part::Test, "return worst(z)"),
                     (Part::Store, "    spectra["),

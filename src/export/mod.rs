@@ -42,7 +42,7 @@ use crate::output::{SharedArray, SpectraArray};
 
 /// Rows of a data set, as an engine draws them: draws, or scenes.
 pub trait Rows {
-    /// A sum that engines share exactly where they round alike.
+    /// A sum that engines share exactly where they round alike: what tells those apart which have not the CPU's bytes.
     fn rounding(&mut self) -> Result<String, EngineError>;
 
     /// Draws some rows, counted from the first of the data set, and hands their columns on in order, window by window,

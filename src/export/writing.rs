@@ -88,8 +88,10 @@ impl Writing {
         let (path, if_exists) = (output.path(), output.if_exists());
         let failed = |source| OutputError::Write { path: path.to_owned(), source };
         schema.shared = rows.shared(&schema.shared).map_err(failed)?;
-        if matches!(output.destination, Destination::Set(_)) {
-            schema.attributes.insert("rounding".to_owned(), rows.rounding()?.into());
+        // All engines that have the CPU's bytes may work on one set; another leaves its mark.
+        let rounding = if engine.is_exact() { None } else { Some(rows.rounding()?) };
+        if let (Destination::Set(_), Some(rounding)) = (output.destination, &rounding) {
+            schema.attributes.insert("rounding".to_owned(), rounding.clone().into());
         }
         let sink = match output.destination {
             Destination::Stdout(format) => {
@@ -104,7 +106,7 @@ impl Writing {
                         PendingFile::create(Sidecar::path(path), IfExists::Replace)?;
                         let model = companions.files.iter().find(|(name, _)| *name == "_model.json");
                         let model = model.map(|(_, text)| text.as_str());
-                        Some(Box::new(Sidecar::new(format, &schema, rows.rounding()?, model)))
+                        Some(Box::new(Sidecar::new(format, &schema, rounding, model)))
                     }
                     false => None,
                 };
@@ -119,7 +121,11 @@ impl Writing {
                 let files: Vec<_> =
                     companions.files.iter().map(|(name, text)| (*name, text.as_str())).collect();
                 // What draws, as far as that can show in the draws.
-                let engine = engine.adapter().map_or_else(|| "CPU".to_owned(), ToString::to_string);
+                let adapter = engine.adapter().map_or_else(|| "CPU".to_owned(), ToString::to_string);
+                let engine = match engine.verdict() {
+                    Some(verdict) => format!("{adapter}, {verdict}"),
+                    None => adapter,
+                };
                 let set = SetWriter::open(path, plan, &files, (output.shard, output.mode), &engine)?;
                 Sink::Set(Box::new(set))
             }

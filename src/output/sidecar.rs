@@ -16,8 +16,8 @@ use super::sum::{LARGEST, Sum, is_signed, signed};
 use super::{FileFormat, OutputError, Schema};
 use crate::plain_file::read_text;
 
-/// Version of the sidecar that this program writes and reads.
-const VERSION: u32 = 1;
+/// Version of the sidecar that this program writes. It reads earlier ones, all of which have a sum of rounding.
+const VERSION: u32 = 2;
 
 /// End of its name, after that of the file.
 const SUFFIX: &str = ".spectroll.json";
@@ -29,8 +29,10 @@ pub struct Sidecar {
     sidecar: u32,
     file: Option<Sum>,
     format: FileFormat,
-    /// Sum that engines share which round alike.
-    rounding: String,
+    /// Sum that engines share which round alike, where that which drew the file had not the CPU's bytes; always there
+    /// in version 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rounding: Option<String>,
     schema: Schema,
     /// Text of the model; `None` of scenes.
     model: Option<String>,
@@ -40,7 +42,12 @@ pub struct Sidecar {
 
 impl Sidecar {
     /// Makes a sidecar of a file that is still to be written.
-    pub fn new(format: FileFormat, schema: &Schema, rounding: String, model: Option<&str>) -> Sidecar {
+    pub fn new(
+        format: FileFormat,
+        schema: &Schema,
+        rounding: Option<String>,
+        model: Option<&str>,
+    ) -> Sidecar {
         Sidecar {
             sidecar: VERSION,
             file: None,
@@ -70,7 +77,7 @@ impl Sidecar {
             text => text.map_err(|e| failed(e.to_string()))?,
         };
         let sidecar: Sidecar = serde_json::from_str(&text).map_err(|e| failed(e.to_string()))?;
-        if sidecar.sidecar != VERSION {
+        if !(1..=VERSION).contains(&sidecar.sidecar) {
             return Err(OutputError::ManifestVersion { path, remedy: "update spectroll" });
         }
         if !is_signed(&text, &sidecar.blake3) {
@@ -135,9 +142,9 @@ impl Sidecar {
         &self.schema
     }
 
-    /// Sum that engines share which round as the one that drew the file.
-    pub fn rounding(&self) -> &str {
-        &self.rounding
+    /// Sum that engines share which round as the one that drew the file; `None` where that had the CPU's bytes.
+    pub fn rounding(&self) -> Option<&str> {
+        self.rounding.as_deref()
     }
 
     /// Text of the model; `None` of scenes.

@@ -7,13 +7,13 @@ use crate::random::normal::{circle, exact_circle, exact_radius, radius};
 use crate::random::truncated;
 
 /// A floating-point type that draws can be computed in: f32, the shader's twin, or f64, its oracle.
-pub trait Real: Arithmetic {
+pub trait Real: DrawOperations {
     /// Two independent standard normals of two independent uniform words.
     fn normal_pair(x: u32, y: u32) -> [Self; 2];
 }
 
-/// Arithmetic of a draw, in a trait of its own that seals [`Real`]: only f32 and f64 have it.
-pub trait Arithmetic:
+/// Operations of a draw, in a trait of its own that seals [`Real`]: only f32 and f64 have it.
+pub trait DrawOperations:
     Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Send + Sync + 'static
 {
     /// Zero.
@@ -45,7 +45,7 @@ impl Real for f32 {
     }
 }
 
-impl Arithmetic for f32 {
+impl DrawOperations for f32 {
     const ZERO: f32 = 0.0;
     const ONE: f32 = 1.0;
     const INFINITY: f32 = f32::INFINITY;
@@ -83,7 +83,7 @@ impl Real for f64 {
     }
 }
 
-impl Arithmetic for f64 {
+impl DrawOperations for f64 {
     const ZERO: f64 = 0.0;
     const ONE: f64 = 1.0;
     const INFINITY: f64 = f64::INFINITY;

@@ -282,6 +282,16 @@ mod tests {
     use crate::random::philox::philox;
     use rand::Rng;
 
+    /// The first word is the low half, as `rand` has it for every generator of 32-bit words.
+    #[test]
+    fn long_words_are_two_short_ones() {
+        let (mut long, mut short) = (Stream::named(3, "x").rng(), Stream::named(3, "x").rng());
+        for _ in 0..9 {
+            let (low, high) = (u64::from(short.next_u32()), u64::from(short.next_u32()));
+            assert_eq!(long.next_u64(), low | high << 32);
+        }
+    }
+
     /// FNV-1a of "" is its offset basis, and of "a" a published test vector: 811c9dc5 and e40c292c.
     #[test]
     fn streams_are_named_by_fnv() {

@@ -30,7 +30,7 @@ use crate::program::{self, Program, feasibility};
 use crate::quantity::{ArrayFormat, Quantity, ValueRange};
 use crate::random::real::Real;
 use crate::random::stream::Stream;
-use crate::wgsl::{self, WgslError};
+use crate::wgsl::{self, ComputeShader, ModuleOptions, ShaderVariant, WgslError};
 
 /// Default limit on the number of candidates of a draw: as many as any driver tries in one dispatch.
 pub const DEFAULT_MAX_ATTEMPTS: u32 = 65_000;
@@ -155,6 +155,15 @@ impl Recipe {
 
     /// The largest luminous reflectance that reflectances of a model can be scaled to and stay below 1, which none
     /// quite reaches: from a linear program. `None` of illuminants, and of a grid without visible light.
+    ///
+    /// ```
+    /// use spectroll::{Model, Recipe};
+    ///
+    /// let largest = Recipe::largest_lrv(&Model::builtin("munsell-vrhel")?).expect("they are reflectances");
+    /// assert!((largest - 0.9959).abs() < 1e-4);
+    /// assert_eq!(Recipe::largest_lrv(&Model::builtin("granada")?), None);
+    /// # Ok::<(), spectroll::ModelError>(())
+    /// ```
     pub fn largest_lrv(model: &Model) -> Option<f64> {
         let weights =
             colorimetry::lrv_weights(model.grid()).filter(|_| model.kind() == SpectrumKind::Reflectance)?;
@@ -243,7 +252,11 @@ impl Recipe {
     /// - for responses, `PREFIX_responses(draw) -> array<f32, channels>`;
     /// - for LRV and intensity, `PREFIX_lrv(draw) -> f32` and `PREFIX_intensity`.
     ///
-    /// The module needs no optional feature. To import it with `naga_oil`, put a line `#define_import_path NAME` before
+    /// - the constants `PREFIX_BANDS`, `PREFIX_FIRST_NM` and, of an even grid, `PREFIX_STEP_NM`; beside spectra
+    ///   `PREFIX_reflectance(draw, nm) -> f32`, or `PREFIX_power` of illuminants, at any wavelength: on the line between two
+    ///   bands, and outside the grid the value of its end.
+    ///
+    /// `index` and `seed` are the low and the high word of a number. The module needs no optional feature. To import it with `naga_oil`, put a line `#define_import_path NAME` before
     /// it, as `spectroll shader --naga-oil` does.
     ///
     /// ```
@@ -254,7 +267,49 @@ impl Recipe {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn wgsl(&self, prefix: &str) -> Result<String, WgslError> {
-        wgsl::module(&self.program, prefix)
+        self.wgsl_with(prefix, ModuleOptions::default())
+    }
+
+    /// Writes the module of [`Recipe::wgsl`] in a form of arithmetic, and with tables in a place of the host's choice.
+    ///
+    /// In the exact form a draw has the bytes of the CPU on every device that rounds sums and products to nearest, and
+    /// the functions that draw take one argument more: `PREFIX_draw(seed, index, zero)`. That `zero` must be 0 and known
+    /// at run time alone, as a member of a uniform buffer is: a compiler that knows it sees through the guards.
+    ///
+    /// ```
+    /// use spectroll::{Arithmetic, Model, ModuleOptions, Recipe};
+    ///
+    /// let recipe = Recipe::builder(&Model::builtin("munsell-vrhel")?).build()?;
+    /// let options = ModuleOptions { arithmetic: Arithmetic::Exact, ..ModuleOptions::default() };
+    /// let text = recipe.wgsl_with("wall", options)?;
+    /// assert!(text.contains("fn wall_draw(seed: vec2<u32>, index: vec2<u32>, zero: u32) -> wall_Draw"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn wgsl_with(&self, prefix: &str, options: ModuleOptions) -> Result<String, WgslError> {
+        wgsl::module(&self.program, self.model.grid(), prefix, options)
+    }
+
+    /// Bytes of the tables that the module reads, as words of 32 bits with the lowest byte first: the content of the
+    /// storage buffer that [`TableStorage::Buffer`](crate::TableStorage::Buffer) declares. Empty where it reads none.
+    pub fn tables(&self) -> Vec<u8> {
+        wgsl::table_words(&self.program).into_iter().flat_map(u32::to_le_bytes).collect()
+    }
+
+    /// Writes the compute shader that makes the draws, with its bindings and the bytes that go into them, for hosts on any
+    /// graphics interface. On wgpu, [`Sampler`](crate::Sampler) does all that.
+    ///
+    /// ```
+    /// use spectroll::{BindingRole, Model, Quantity, Recipe, ShaderVariant, Stream};
+    ///
+    /// let recipe = Recipe::builder(&Model::builtin("munsell-vrhel")?).build()?;
+    /// let shader = recipe.compute_shader(ShaderVariant::default())?;
+    /// assert_eq!((shader.workgroups(1000), shader.dispatches()), (16, 1));
+    /// assert_eq!(shader.bytes(BindingRole::Output(Quantity::Spectra), 1000), 4 * 31 * 1000);
+    /// assert_eq!(shader.parameters(Stream::new(7).draws(0..1000), 1000)[..4], 7u32.to_ne_bytes());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn compute_shader(&self, variant: ShaderVariant) -> Result<ComputeShader, WgslError> {
+        ComputeShader::new(&self.program, variant)
     }
 
     /// The program of the model's own Gaussian, and the map of the responses that this recipe's draws are given.

@@ -8,9 +8,9 @@ use wgpu::{BufferUsages, Device};
 
 use crate::engine::{DrawSummary, EngineError};
 use crate::quantity::Quantity;
-use crate::sampler::{Prepared, Sampler, SamplerError, filled};
+use crate::sampler::{Prepared, Sampler, SamplerError, SamplerOptions, filled};
 use crate::threads;
-use crate::wgsl::WORKGROUP;
+use crate::wgsl::{Arithmetic, WORKGROUP};
 
 use super::Scene;
 use super::group::IntensityScope;
@@ -71,6 +71,16 @@ struct Sizes {
 impl<'a> SceneSampler<'a> {
     /// Compiles what the groups need that are drawn for each scene, and draws what serves all scenes.
     pub fn new(device: &Device, scene: &'a Scene) -> Result<SceneSampler<'a>, EngineError> {
+        SceneSampler::with_arithmetic(device, scene, Arithmetic::Plain)
+    }
+
+    /// Compiles as [`SceneSampler::new`] does, in a form of arithmetic: that which [`probe`](crate::probe()) found for the
+    /// device.
+    pub fn with_arithmetic(
+        device: &Device,
+        scene: &'a Scene,
+        arithmetic: Arithmetic,
+    ) -> Result<SceneSampler<'a>, EngineError> {
         let mut samplers: Vec<Option<Sampler>> = Vec::new();
         for (i, plan) in scene.plans.iter().enumerate() {
             let Some(drawing) = plan.drawn_by_engine() else {
@@ -83,7 +93,9 @@ impl<'a> SceneSampler<'a> {
             };
             samplers.push(Some(match scene.plans[..i].iter().position(same) {
                 Some(other) => samplers[other].clone().expect("the device draws it"),
-                None => Sampler::of(device, &program)?,
+                None => {
+                    Sampler::of(device, &program, SamplerOptions { arithmetic, ..SamplerOptions::default() })?
+                }
             }));
         }
         let copies = scene.plans.iter().any(copies).then(|| pipeline(device));

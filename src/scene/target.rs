@@ -8,7 +8,7 @@ use crate::dataset::SpectrumKind;
 use crate::draw_status::DrawStatus;
 use crate::program::condition::Condition;
 use crate::program::{self, Bounds, LrvLaw, LrvTarget, Program};
-use crate::random::real::Arithmetic;
+use crate::random::real::DrawOperations;
 use crate::random::stream::{self, Stream};
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, ProposalKind, Recipe, RecipeBuilder, RecipeError};
 

@@ -24,7 +24,7 @@ pub(super) fn acceptance(text: &mut Text, program: &Program, part: Option<Part>)
             false => body.line(&format!("return worst(z) < {limit}u;")),
             true => {
                 body.line("let e = worst(z);");
-                body.line(&format!("return e < {limit}u && peak(e) * factor(z{argument}) < 1f;"));
+                body.line(&format!("return e < {limit}u && rounded(peak(e) * factor(z{argument})) < 1f;"));
             }
         }
     });

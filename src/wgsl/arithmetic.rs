@@ -16,16 +16,16 @@ use super::acceptance::acceptance;
 use super::shader::{LOOPED, LUMINANCE, NORMALS};
 use super::tables::Tables;
 use super::writer::{Text, float, list};
-use super::{COVER_AT, Form, Part};
+use super::{Arithmetic, Form, Part};
 use crate::affine::Affine;
 use crate::program::{IntensityLaw, LrvLaw, LrvTarget, Program, Source, Unit};
-use crate::random::real::Arithmetic;
+use crate::random::real::DrawOperations;
 use crate::random::stream;
 
-/// Writes all of the arithmetic but a part.
-pub(super) fn arithmetic(program: &Program, tables: &Tables, part: Option<Part>) -> String {
+/// Writes all of the arithmetic but a part, with guards. The form says how a long sum is written alone.
+pub(super) fn arithmetic(program: &Program, tables: &Tables, form: Arithmetic, part: Option<Part>) -> String {
     let mut text = match Form::of(program) {
-        Form::Unrolled => unrolled(program),
+        Form::Unrolled => unrolled(program, form),
         Form::Looped => looped(program, tables),
     };
     if let Some(target) = &program.target {
@@ -49,20 +49,22 @@ pub(super) fn arithmetic(program: &Program, tables: &Tables, part: Option<Part>)
 
 /// Writes the factor that scales a candidate to the target, and each draw's target where it has its own.
 fn factor(text: &mut Text, target: &LrvTarget) {
-    let floor = <f32 as Arithmetic>::FLOOR;
+    let floor = <f32 as DrawOperations>::FLOOR;
     match target.lrv {
         LrvLaw::Fixed(lrv) => text.block("fn factor(z: Normals) -> f32", |body| {
-            body.line(&format!("return {} / max(luminance(z), {floor:?}f);", float(lrv)));
+            body.line(&format!("return ratio({}, max(luminance(z), {floor:?}f));", float(lrv)));
         }),
         LrvLaw::Uniform { low, span, high } => {
             let head = "fn target_lrv_of(key: vec2<u32>, index: vec2<u32>, stream: u32) -> f32";
             text.block(head, |body| {
                 body.line(&draw_word());
                 let [low, span, high] = [low, span, high].map(float);
-                body.line(&format!("return min({low} + {span} * uniform_of(word), {high});"));
+                body.line(&format!(
+                    "return min(rounded({low} + rounded({span} * uniform_of(word))), {high});"
+                ));
             });
             text.block("fn factor(z: Normals, target_lrv: f32) -> f32", |body| {
-                body.line(&format!("return target_lrv / max(luminance(z), {floor:?}f);"));
+                body.line(&format!("return ratio(target_lrv, max(luminance(z), {floor:?}f));"));
             });
         }
     }
@@ -78,24 +80,24 @@ fn draw_level(body: &mut Text, level: &IntensityLaw, tables: &Tables) {
     match level {
         IntensityLaw::LogUniform { low, octaves } => {
             body.line(&format!(
-                "return {} * power_of_two(uniform_of(word) * {});",
+                "return rounded({} * power_of_two(rounded(uniform_of(word) * {})));",
                 float(*low),
                 float(*octaves)
             ));
         }
         IntensityLaw::OneOf(levels) => {
-            body.line(&format!("return tables[{}u + mul_wide(word, {}u).y];", tables.levels, levels.len()));
+            body.line(&format!("return number({}u + mul_wide(word, {}u).y);", tables.levels, levels.len()));
         }
     }
 }
 
-fn unrolled(program: &Program) -> Text {
+fn unrolled(program: &Program, form: Arithmetic) -> Text {
     let (n, k) = (program.bands(), program.components());
     let mut text = Text::default();
     text.line(&format!("alias Normals = array<f32, {k}>;"));
     given(&mut text, program.given);
     match &program.proposal {
-        Some(proposal) => text.line(&proposal.rounded::<f32>().text(k, COVER_AT)),
+        Some(proposal) => text.line(&proposal.rounded::<f32>().text(k)),
         None => normals(&mut text, program.given, program.normals()),
     }
     text.line("");
@@ -109,7 +111,7 @@ fn unrolled(program: &Program) -> Text {
         text.block("fn luminance(z: Normals) -> f32", |body| {
             let products =
                 target.weights.iter().enumerate().map(|(b, w)| format!("{} * band{b}(z)", float(*w)));
-            body.line(&format!("return {};", products.collect::<Vec<_>>().join(" + ")));
+            long_sum(body, form, products);
         });
     }
     for output in &program.outputs {
@@ -153,13 +155,24 @@ fn normals(text: &mut Text, given: usize, k: usize) {
     );
 }
 
+/// Returns a sum of products, in their order. Compilers refuse to nest as many guards as there may be bands.
+fn long_sum(body: &mut Text, form: Arithmetic, mut products: impl Iterator<Item = String>) {
+    if form == Arithmetic::Plain {
+        return body.line(&format!("return {};", products.collect::<Vec<_>>().join(" + ")));
+    }
+    body.line(&format!("var s = rounded({});", products.next().expect("there are bands")));
+    products.for_each(|product| body.line(&format!("s = rounded(s + rounded({product}));")));
+    body.line("return s;");
+}
+
 /// A function of the normals for each value of a map: its name is `name` and the value's number. Gains of 0 are left
 /// out, which changes no sum: an offset of -0 is rounded to 0.
 fn forms(text: &mut Text, name: &str, map: &Affine) {
     for (row, &offset) in map.offset.iter().enumerate() {
         let gains = map.gain.iter().map(|gain| gain[row]).enumerate().filter(|(_, g)| *g as f32 != 0.0);
-        let terms: String = gains.map(|(j, g)| format!(" + {} * z[{j}]", float(g))).collect();
-        text.line(&format!("fn {name}{row}(z: Normals) -> f32 {{ return {}{terms}; }}", float(offset + 0.0)));
+        let first = float(offset + 0.0);
+        let sum = gains.fold(first, |sum, (j, g)| format!("rounded({sum} + rounded({} * z[{j}]))", float(g)));
+        text.line(&format!("fn {name}{row}(z: Normals) -> f32 {{ return {sum}; }}"));
     }
 }
 
@@ -200,19 +213,24 @@ fn looped(program: &Program, tables: &Tables) -> Text {
     text.line("\n// A row of the model: a band, or a value of another quantity.");
     text.line("fn form(z: ptr<function, Normals>, row: u32) -> f32 {");
     text.line(&format!("    let start = row * {}u;", k + 1));
-    text.line("    var s = tables[start];");
+    text.line("    var s = number(start);");
     let looped = TILE * tiles(k);
+    let add = |number: String, z: String| format!("s = rounded(s + rounded(number({number}) * (*z)[{z}]));");
     if looped > 0 {
         text.line(&format!("    for (var j = 0u; j < {looped}u; j += {TILE}u) {{"));
         (0..TILE).for_each(|i| {
-            text.line(&format!("        s += tables[start + j + {}u] * (*z)[j + {i}u];", i + 1))
+            let line = add(format!("start + j + {}u", i + 1), format!("j + {i}u"));
+            text.line(&format!("        {line}"));
         });
         text.line("    }");
     }
-    (looped..k).for_each(|j| text.line(&format!("    s += tables[start + {}u] * (*z)[{j}];", j + 1)));
+    (looped..k).for_each(|j| {
+        let line = add(format!("start + {}u", j + 1), j.to_string());
+        text.line(&format!("    {line}"));
+    });
     text.line("    return s;\n}\n");
     match &program.proposal {
-        Some(proposal) => text.0 += &proposal.rounded::<f32>().text(4 * k.div_ceil(4), COVER_AT),
+        Some(proposal) => text.0 += &proposal.rounded::<f32>().text(4 * k.div_ceil(4)),
         None => text.0 += &after_given(NORMALS, first),
     }
     if program.target.is_some() {

@@ -7,19 +7,19 @@ const COVER: &str = include_str!("../../shaders/cover.wgsl");
 
 impl BoxMixture<f32> {
     /// `candidate(key, index, stream, attempt) -> Candidate`: the coordinates, as `Normals` that are made of as many
-    /// floats as `padded`, and whether thinning keeps them. Reads [`words`](Self::words) from a buffer at `binding`.
+    /// floats as `padded`, and whether thinning keeps them. Reads [`words`](Self::words), of which `box_row(i)` gives four.
     /// Needs the fragments that make random words and normals.
-    pub(crate) fn text(&self, padded: usize, binding: u32) -> String {
+    pub(crate) fn text(&self, padded: usize) -> String {
         let k = self.components;
         let word = |w: usize| format!("w{}.{}", w / 4, ["x", "y", "z", "w"][w % 4]);
         let blocks = (0..self.blocks())
             .map(|b| format!("    let w{b} = philox(vec4(index, attempt, stream | {b}u), key);\n"));
         let coordinates = (0..k).map(|j| format!("    let c{j} = coordinate(row, {j}u, {});\n", word(j + 1)));
         let normals = (0..padded).map(|j| if j < k { format!("c{j}.x") } else { "0f".to_owned() });
-        let costs: String = (0..k).map(|j| format!(" + c{j}.y")).collect();
+        let first = "bitcast<f32>(box_row(row).z)".to_owned();
+        let cost = (0..k).fold(first, |sum, j| format!("rounded({sum} + c{j}.y)"));
         format!(
             "{TRUNCATED}
-@group(0) @binding({binding}) var<storage, read> cover: array<vec4<u32>>;
 const BITS = {}u;
 const ROWS = {}u;
 
@@ -28,7 +28,7 @@ struct Candidate {{ z: Normals, kept: bool }}
 
 fn candidate(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Candidate {{
 {}    let row = choose({});
-{}    let cost = bitcast<f32>(cover[row].z){costs};
+{}    let cost = {cost};
     return Candidate(Normals({}), cost < chi_square({}));
 }}
 ",
@@ -47,8 +47,12 @@ fn candidate(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Can
 mod tests {
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
+    use super::super::guards::{Zero, written};
     use crate::cover::tests::near_white;
-    use crate::wgsl::{Dialect, generator};
+    use crate::wgsl::{Arithmetic, Dialect, generator};
+
+    const BOX_ROW: &str = "@group(0) @binding(4) var<storage, read> cover: array<vec4<u32>>;
+        fn box_row(i: u32) -> vec4<u32> { return cover[i]; }";
 
     #[test]
     fn the_text_is_valid_without_any_capability() {
@@ -58,7 +62,8 @@ mod tests {
             (8, "alias Normals = array<f32, 8>;"),
         ];
         for (padded, normals) in normals {
-            let text = [normals, &generator(Dialect::Baseline), &proposal.text(padded, 4)].join("\n");
+            let candidates = written(&proposal.text(padded), Arithmetic::Plain, Zero::Parameter);
+            let text = [normals, &generator(Dialect::Baseline), &candidates, BOX_ROW].join("\n");
             let module = naga::front::wgsl::parse_str(&text).map_err(|e| e.emit_to_string(&text)).unwrap();
             let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
             validator.validate(&module).map_err(|e| e.emit_to_string(&text)).unwrap();

@@ -5,10 +5,14 @@
 //! no stores but of what was asked for. Straight lines are several times as fast as a loop that reads the model from a
 //! buffer, but take time to compile. Beyond [`UNROLLED_GAINS`] the same operations run in such a loop: same order, same
 //! bits.
+//!
+//! A text has one of two forms ([`Arithmetic`]), which differ in the [guards](guards) of their operations alone.
 
 mod acceptance;
 mod arithmetic;
+mod compute_shader;
 mod cover;
+mod guards;
 #[cfg(test)]
 pub(crate) mod layout;
 mod module;
@@ -17,15 +21,19 @@ mod module;
 mod part;
 #[cfg(test)]
 mod probe;
+mod self_test;
 mod shader;
 mod store;
 mod tables;
 mod writer;
 
-pub use module::WgslError;
-pub(crate) use module::module;
+pub use compute_shader::{Binding, BindingRole, ComputeShader, ShaderVariant};
+pub use module::{ModuleOptions, TableStorage, WgslError};
+pub(crate) use module::{module, table_words};
 #[cfg_attr(not(feature = "report"), allow(unreachable_pub))]
 pub use part::Part;
+pub use self_test::ArithmeticTrait;
+pub(crate) use self_test::{CASES, self_test};
 pub(crate) use tables::Tables;
 
 #[cfg(any(test, feature = "report"))]
@@ -33,6 +41,8 @@ pub(crate) use shader::generator;
 #[cfg(feature = "report")]
 pub(crate) use shader::shader_without;
 pub(crate) use shader::{attempts_per_dispatch, is_sliced, shader, shader_of};
+
+use serde::{Deserialize, Serialize};
 
 use crate::program::{Output, Program};
 use crate::quantity::{Dtype, Quantity};
@@ -65,10 +75,33 @@ pub(crate) const GIVEN_AT: u32 = INDICES_AT + 1;
 /// compile the straight lines, which then run 7 times as fast as the loop: they pay from 2e5 draws on.
 const UNROLLED_GAINS: usize = 2048;
 
+/// Form of the arithmetic of a text.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Arithmetic {
+    /// Operations as they stand: the draws of the CPU on a device whose compiler keeps to them.
+    #[default]
+    Plain,
+    /// Operations that no compiler can fuse or rearrange, roots and quotients corrected: the draws of the CPU on any
+    /// device that rounds sums and products to nearest.
+    Exact,
+}
+
+impl std::fmt::Display for Arithmetic {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Arithmetic::Plain => "plain",
+            Arithmetic::Exact => "exact",
+        })
+    }
+}
+
 /// Capabilities of a device on which the text depends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Dialect {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Dialect {
     /// Any device.
+    #[default]
     Baseline,
     /// A device with `SHADER_INT64`.
     Int64,
@@ -77,9 +110,10 @@ pub(crate) enum Dialect {
 }
 
 /// Source of the indices of draws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Indexing {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Indexing {
     /// A range, by its first index.
+    #[default]
     Range,
     /// A list in a buffer: any indices in any order.
     List,
@@ -120,10 +154,12 @@ mod tests {
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     use super::arithmetic::arithmetic;
+    use super::guards::{Zero, written};
     use super::store::store;
     use super::*;
     use crate::affine::Affine;
     use crate::dataset::SpectrumKind;
+    use crate::grid::Grid;
     use crate::program::{self, Bounds, IntensityLaw, LrvLaw, Source, Unit};
     use crate::quantity::{ArrayFormat, Layout};
 
@@ -260,11 +296,13 @@ mod tests {
                 (Dialect::Int64, Capabilities::SHADER_INT64),
                 (Dialect::SoftwareInt64, Capabilities::SHADER_INT64),
             ] {
-                for indexing in [Indexing::Range, Indexing::List] {
-                    let (text, _) = shader_of(&program, target, indexing);
+                for (indexing, arithmetic) in VARIANTS {
+                    let variant = ShaderVariant { dialect: target, indexing, arithmetic };
+                    let (text, _) = shader_of(&program, variant);
                     if let Err(e) = validate(&text, needs) {
-                        panic!("{target:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
+                        panic!("{variant:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
                     }
+                    assert!(!text.contains("//!") && !text.contains("src/"), "notes for us: {text}");
                 }
             }
         }
@@ -272,19 +310,32 @@ mod tests {
 
     #[test]
     fn every_module_is_valid_and_two_fit_in_one_shader() {
-        for program in programs() {
-            let (Ok(a), Ok(b)) = (module(&program, "wall"), module(&program, "table_top")) else {
-                let table = matches!(program.intensity, Some(IntensityLaw::OneOf(_)));
-                assert!(table || Form::of(&program) == Form::Looped);
-                continue;
-            };
-            let both = format!("{a}\n{b}");
-            validate(&both, Capabilities::empty()).unwrap_or_else(|e| panic!("{e}"));
+        // A part of them, of every kind: there are hundreds.
+        for program in programs().into_iter().step_by(11) {
+            let even = Grid::new(400.0, 0.5, program.bands()).unwrap();
+            let uneven: Vec<f64> = (0..program.bands()).map(|b| 400.0 + (b * b) as f64 / 7.0).collect();
+            for (arithmetic, grid) in
+                [(Arithmetic::Plain, even), (Arithmetic::Exact, Grid::from_wavelengths(&uneven).unwrap())]
+            {
+                let of = |prefix, binding| {
+                    let tables = (!table_words(&program).is_empty())
+                        .then_some(TableStorage::Buffer { group: 1, binding });
+                    module(&program, &grid, prefix, ModuleOptions { arithmetic, tables }).unwrap()
+                };
+                let both = format!("{}\n{}", of("wall", 0), of("table_top", 1));
+                validate(&both, Capabilities::empty()).unwrap_or_else(|e| panic!("{e}"));
+            }
         }
+        let grid = Grid::new(400.0, 10.0, 1).unwrap();
         for prefix in ["", "1a", "a b", "a_", "a__b", "_a", "ä"] {
-            assert_eq!(module(&programs()[0], prefix), Err(WgslError::Prefix(prefix.to_owned())));
+            let made = module(&programs()[0], &grid, prefix, ModuleOptions::default());
+            assert_eq!(made, Err(WgslError::Prefix(prefix.to_owned())));
         }
     }
+
+    /// Both forms, and both sources of indices.
+    const VARIANTS: [(Indexing, Arithmetic); 2] =
+        [(Indexing::Range, Arithmetic::Exact), (Indexing::List, Arithmetic::Plain)];
 
     #[test]
     fn int64_is_not_taken_without_asking() {
@@ -304,7 +355,9 @@ mod tests {
         let lamps = || Program { intensity: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..light() };
         let generated = |program: &Program, target| {
             let tables = Tables::new(program);
-            arithmetic(program, &tables, None) + &store(program, &tables, target, None)
+            let text = arithmetic(program, &tables, Arithmetic::Plain, None)
+                + &store(program, &tables, target, None);
+            written(&text, Arithmetic::Plain, Zero::Parameter)
         };
         for (name, program, target) in [
             ("illuminant", light(), Dialect::Baseline),
@@ -340,6 +393,12 @@ mod tests {
         ] {
             insta::assert_snapshot!(name, generated(&program, target));
         }
+        // What the exact form has in place of `lrv_base`.
+        let (program, exact) = (lrv(Bounds::Base), Arithmetic::Exact);
+        let tables = Tables::new(&program);
+        let text =
+            arithmetic(&program, &tables, exact, None) + &store(&program, &tables, Dialect::Baseline, None);
+        insta::assert_snapshot!("exact_lrv_base", text);
         let large = |law, layout, spectra| {
             with_all(
                 program_of(SpectrumKind::Reflectance, 400, 6, Some((law, Bounds::Both))),

@@ -1,17 +1,20 @@
 //! The generator's fragments on an adapter, function by function, against their CPU twins: where a draw differs,
 //! these say which part of it does.
 
+use crate::dataset::{BuiltinTable, Dataset, SpectrumKind};
 use crate::engine::compute::{Compute, Words};
 use crate::engine::{Engine, EngineChoice};
-use crate::model::Model;
+use crate::grid::{Extrapolation, Grid};
+use crate::model::{Fit, Model};
 use crate::program::Bounds;
 use crate::quantity::Quantity;
 use crate::random::normal::{circle, radius};
 use crate::random::philox::{KNOWN_ANSWERS, philox};
 use crate::random::stream::Stream;
 use crate::random::truncated::truncated;
-use crate::recipe::Recipe;
-use crate::wgsl::{Dialect, generator};
+use crate::recipe::{Intensity, Recipe};
+use crate::wgsl::guards::{Zero, written};
+use crate::wgsl::{Arithmetic, Dialect, ModuleOptions, TableStorage, generator, table_words};
 
 /// Runs `body` for each `i` on the best adapter, and returns `output`.
 fn run(target: Dialect, body: &str, input: &[u32], output_words: usize) -> Option<Vec<u32>> {
@@ -121,7 +124,7 @@ fn truncated_normals_are_those_of_their_twin() {
     let cases: Vec<_> = words.iter().step_by(7).zip(axes.iter().cycle()).collect();
     let input: Vec<u32> =
         cases.iter().flat_map(|(word, axis)| std::iter::once(**word).chain(axis.iter().copied())).collect();
-    let fragments = include_str!("../../shaders/truncated.wgsl");
+    let fragments = written(include_str!("../../shaders/truncated.wgsl"), Arithmetic::Plain, Zero::Parameter);
     let allowed = allowed_ulps();
     for (element, name) in ["x", "y"].into_iter().enumerate() {
         let body = format!(
@@ -130,11 +133,15 @@ fn truncated_normals_are_those_of_their_twin() {
                 output[i] = bitcast<u32>(truncated(axis, input[5u*i]).{name});
             }}"
         );
-        let found = run_with(Dialect::Baseline, fragments, &[], &body, &input, cases.len());
+        let found = run_with(Dialect::Baseline, &fragments, &[], &body, &input, cases.len());
         let expected = cases.iter().map(|(word, axis)| truncated(axis.map(f32::from_bits), **word)[element]);
         assert!(ulps(&found.expect("every adapter runs the baseline"), expected) <= allowed);
     }
 }
+
+const BOX_ROW: &str = "
+@group(0) @binding(2) var<storage, read> cover: array<vec4<u32>>;
+fn box_row(i: u32) -> vec4<u32> { return cover[i]; }";
 
 /// Whole candidates: every coordinate, and whether thinning keeps them.
 #[test]
@@ -144,7 +151,8 @@ fn candidates_of_a_cover_are_those_of_their_twin() {
     let proposal = cover.proposal().rounded::<f32>();
     let stream = Stream::new(0x0123_4567_89AB_CDEF);
     let fields: Vec<_> = (0..6).map(|j| format!("z{j}: f32")).collect();
-    let fragments = format!("struct Normals {{ {} }}\n{}", fields.join(", "), proposal.text(6, 2));
+    let candidates = written(&proposal.text(6), Arithmetic::Plain, Zero::Parameter);
+    let fragments = format!("struct Normals {{ {} }}\n{candidates}{BOX_ROW}", fields.join(", "));
     let body = "if i < arrayLength(&output) / 7u {
         let c = candidate(vec2(0x89ABCDEFu, 0x01234567u), vec2(i, 0u), 0u, 3u);
         output[7u*i] = bitcast<u32>(c.z.z0); output[7u*i+1u] = bitcast<u32>(c.z.z1);
@@ -165,32 +173,96 @@ fn candidates_of_a_cover_are_those_of_their_twin() {
     assert!(ulps(&found, expected.into_iter()) <= allowed_ulps());
 }
 
-/// The functions that a host calls: a draw's own target, and the spectrum that was scaled to it.
+/// Recipes with every kind of module: in straight lines and in loops, with tables and without, on even and uneven grids.
+fn recipes_of_modules() -> Vec<(&'static str, Recipe)> {
+    let surface = Model::builtin("munsell-vrhel").unwrap();
+    let light = Model::builtin("granada").unwrap();
+    let uneven = Grid::from_wavelengths(&[401.0, 443.5, 490.0, 510.0, 555.0, 670.0]).unwrap();
+    let uneven = Model::builtin_at("munsell-vrhel", uneven).unwrap();
+    let grid = "390:1:730".parse().unwrap();
+    let data = Dataset::new(&[BuiltinTable::Vrhel.table()], grid, Extrapolation::Error).unwrap();
+    let fine = Fit::new(SpectrumKind::Reflectance).components(7).fit(&data).unwrap();
+    let bounded = |model, bounds| Recipe::builder(model).lrv(0.2..0.8).bounds(bounds);
+    let recipes = [
+        ("base", bounded(&surface, Bounds::Base)),
+        ("scaled", bounded(&surface, Bounds::Scaled)),
+        ("both", bounded(&surface, Bounds::Both)),
+        ("plain", Recipe::builder(&surface)),
+        ("uneven", Recipe::builder(&uneven).lrv(0.4)),
+        ("cover", Recipe::builder(&surface).lrv(0.99).bounds(Bounds::Scaled)),
+        ("log-uniform", Recipe::builder(&light).intensity(Intensity::LogUniform(0.15, 150.0))),
+        ("of the data", Recipe::builder(&light).intensity(Intensity::Data)),
+        ("looped", Recipe::builder(&fine).lrv(0.4).bounds(Bounds::Both)),
+    ];
+    let quantities = [Quantity::Spectra, Quantity::Xyz, Quantity::Weights];
+    recipes.map(|(name, builder)| (name, builder.quantities(quantities).build().unwrap())).into()
+}
+
+/// The functions that a host calls, in both forms, from a buffer and, where the table is small, a constant.
 #[test]
 fn modules_make_the_draws_of_their_recipe() {
-    const COUNT: u64 = 4097;
-    let model = Model::builtin("munsell-vrhel").unwrap();
-    for bounds in [Bounds::Base, Bounds::Scaled, Bounds::Both] {
-        let recipe = Recipe::builder(&model).lrv(0.2..0.8).bounds(bounds);
-        let recipe = recipe.quantities([Quantity::Spectra, Quantity::Lrv]).build().unwrap();
-        let stream = Stream::named(0x0123_4567_89AB_CDEF, "wall");
-        let body = format!(
-            "if i < arrayLength(&output) / 3u {{
-                let d = wall_draw_in({}u, vec2(0x89ABCDEFu, 0x01234567u), vec2(i, 0u));
-                output[3u*i] = bitcast<u32>(wall_lrv(d)) + input[0];
-                output[3u*i+1u] = bitcast<u32>(wall_at(d, 0u));
-                output[3u*i+2u] = bitcast<u32>(wall_spectrum(d)[30]);
-            }}",
-            stream.id()
-        );
-        let words = 3 * COUNT as usize;
-        let found = run_with(Dialect::Baseline, &recipe.wgsl("wall").unwrap(), &[], &body, &[0], words);
+    const COUNT: u64 = 1031;
+    const VALUES: usize = 8;
+    let stream = Stream::named(0x0123_4567_89AB_CDEF, "wall");
+    for (name, recipe) in recipes_of_modules() {
+        let (grid, bands) = (recipe.model().grid(), recipe.model().bands());
+        let [low_nm, high_nm, third] = [1, 2, 3].map(|band| grid.wavelength(band) as f32);
+        let between = low_nm + 0.25 * (high_nm - low_nm);
+        let tables = table_words(recipe.program());
+        let buffer = TableStorage::Buffer { group: 0, binding: 2 };
+        let places = match tables.len() {
+            0 => vec![None],
+            1..=2047 => vec![Some(TableStorage::Const), Some(buffer)],
+            _ => vec![Some(buffer)],
+        };
+        let at = if recipe.model().kind() == SpectrumKind::Illuminant { "power" } else { "reflectance" };
         let sampler = recipe.scalar_sampler::<f32>();
-        let expected = (0..COUNT).flat_map(|index| {
+        let mut expected = Vec::new();
+        for index in 0..COUNT {
             let drawn = sampler.draw(stream, index);
-            [drawn.values(Quantity::Lrv)[0], drawn.spectrum()[0], drawn.spectrum()[30]]
-        });
-        let found = found.expect("every adapter runs the baseline");
-        assert!(ulps(&found, expected) <= allowed_ulps(), "{bounds:?}");
+            let (spectrum, xyz) = (drawn.spectrum(), drawn.values(Quantity::Xyz));
+            let share = match grid.step() {
+                Some(step) => (between - grid.first() as f32) / step as f32 - 1.0,
+                None => (between - low_nm) / (high_nm - low_nm),
+            };
+            let value = spectrum[1] + share * (spectrum[2] - spectrum[1]);
+            let weights = drawn.values(Quantity::Weights);
+            let values = [spectrum[0], spectrum[bands - 1], spectrum[3], value, xyz[0], xyz[2], weights[0]];
+            expected.extend(values.into_iter().chain([f32::from_bits(drawn.status().attempts())]));
+        }
+        let forms = [Arithmetic::Plain, Arithmetic::Exact];
+        for (arithmetic, tables_at) in
+            forms.into_iter().flat_map(|form| places.iter().map(move |&p| (form, p)))
+        {
+            let options = ModuleOptions { arithmetic, tables: tables_at };
+            // A word of a buffer is a zero that no compiler knows.
+            let zero = if arithmetic == Arithmetic::Exact { ", input[0]" } else { "" };
+            let values = [
+                "wall_at(d, 0u)".to_owned(),
+                format!("wall_spectrum(d)[{}]", bands - 1),
+                format!("wall_{at}(d, {third:?}f)"),
+                format!("wall_{at}(d, {between:?}f)"),
+                "wall_xyz(d).x".to_owned(),
+                "wall_xyz(d).z".to_owned(),
+                "wall_weights(d)[0]".to_owned(),
+                "bitcast<f32>(d.attempts)".to_owned(),
+            ];
+            let stores = values.iter().enumerate();
+            let stores: String = stores
+                .map(|(j, value)| format!("output[{VALUES}u*i+{j}u] = bitcast<u32>({value}) + input[0];\n"))
+                .collect();
+            let body = format!(
+                "if i < arrayLength(&output) / {VALUES}u {{
+                    let d = wall_draw_in({}u, vec2(0x89ABCDEFu, 0x01234567u), vec2(i, 0u){zero});
+                    {stores}
+                }}",
+                stream.id()
+            );
+            let table: &[u32] = if tables_at == Some(buffer) { &tables } else { &[] };
+            let text = recipe.wgsl_with("wall", options).unwrap();
+            let found = run_with(Dialect::Baseline, &text, table, &body, &[0], VALUES * COUNT as usize);
+            let found = found.expect("every adapter runs the baseline");
+            assert!(ulps(&found, expected.iter().copied()) <= allowed_ulps(), "{name}, {options:?}");
+        }
     }
 }

@@ -1,10 +1,12 @@
 //! The text of a shader: fragments, and what is generated for a program between them.
 
 use super::arithmetic::{self, arithmetic};
+use super::guards::{Zero, written};
 use super::store::store;
+use super::writer::list;
 use super::{
-    Dialect, Form, GIVEN_AT, INDICES_AT, Indexing, PROGRESS_AT, Part, TABLES_AT, Tables, WORKGROUP,
-    draws_per_thread, part,
+    Arithmetic, COVER_AT, Dialect, Form, GIVEN_AT, INDICES_AT, Indexing, PROGRESS_AT, Part, ShaderVariant,
+    TABLES_AT, Tables, WORKGROUP, draws_per_thread, part,
 };
 use crate::program::{IntensityLaw, Program};
 use crate::quantity::Dtype;
@@ -65,10 +67,10 @@ fn kept(fragment: &str, holds: impl Fn(&str) -> bool) -> String {
     fragment.lines().filter_map(line).collect()
 }
 
-/// The fragments that make random words and normals: the whole of what does not depend on a program.
+/// The fragments that make random words and normals, plain: the whole of what does not depend on a program.
 #[cfg(any(test, feature = "report"))]
 pub(crate) fn generator(target: Dialect) -> String {
-    generator_without(target, None)
+    written(&generator_without(target, None), Arithmetic::Plain, Zero::Parameter)
 }
 
 fn generator_without(target: Dialect, part: Option<Part>) -> String {
@@ -81,26 +83,20 @@ fn generator_without(target: Dialect, part: Option<Part>) -> String {
     [mul_wide, philox, normal].join("\n")
 }
 
-/// The compute shader of a program, for ranges of draws, and the numbers that it reads.
+/// The compute shader of a program, in its plain form and for ranges of draws, and the numbers that it reads.
 pub(crate) fn shader(program: &Program, target: Dialect) -> (String, Tables) {
-    shader_of(program, target, Indexing::Range)
+    shader_of(program, ShaderVariant { dialect: target, ..ShaderVariant::default() })
 }
 
-/// The compute shader of a program, for draws whose indices are given in this way, and the numbers that it reads.
-pub(crate) fn shader_of(program: &Program, target: Dialect, indexing: Indexing) -> (String, Tables) {
-    shader_with(program, target, indexing, None)
+/// The compute shader of a program in one of its variants, and the numbers that it reads.
+pub(crate) fn shader_of(program: &Program, variant: ShaderVariant) -> (String, Tables) {
+    shader_without(program, variant, None)
 }
 
-/// The compute shader of a program, which lacks a part: what it draws is wrong, and its time shows what the part costs.
-#[cfg(feature = "report")]
-pub(crate) fn shader_without(program: &Program, target: Dialect, part: Option<Part>) -> (String, Tables) {
-    shader_with(program, target, Indexing::Range, part)
-}
-
-fn shader_with(
+/// The compute shader of a program. Where it lacks a part, what it draws is wrong, and its time shows what the part costs.
+pub(crate) fn shader_without(
     program: &Program,
-    target: Dialect,
-    indexing: Indexing,
+    ShaderVariant { dialect: target, indexing, arithmetic }: ShaderVariant,
     part: Option<Part>,
 ) -> (String, Tables) {
     let changed = (part == Some(Part::Reconstruction)).then(|| one_gain_each(program));
@@ -109,28 +105,35 @@ fn shader_with(
     let draws = draws_per_thread(program, target);
     let sliced = is_sliced(program, target);
     let holds = |word: &str| match word {
-        "sliced" | "whole" | "in_slices" | "in_one" | "sliced_given" | "whole_given" => {
-            is_drawn(word, sliced, program)
-        }
+        "sliced" => sliced,
+        "whole" => !sliced,
         "given" => program.given > 0,
         "ranged" => indexing == Indexing::Range,
         "listed" => indexing == Indexing::List,
+        "exact" => arithmetic == Arithmetic::Exact,
         other => unreachable!("a fragment has a line for shaders that are {other:?}"),
     };
     let mut parts = vec![
-        functions(program, &tables, target, sliced, part),
+        functions(program, &tables, (target, arithmetic), (sliced, false), part),
         kept(PARAMETERS, holds)
             .replace("INDICES_AT", &INDICES_AT.to_string())
-            .replace("GIVEN_AT", &GIVEN_AT.to_string()),
+            .replace("GIVEN_AT", &GIVEN_AT.to_string())
+            .replace(" GIVEN_ARGUMENT", given(program, ", given_at(i)")),
     ];
     if program.given > 0 {
-        parts.push(GIVEN.replace("COUNT", &format!("{}u", program.given)));
+        let count = program.given;
+        parts.push(GIVEN.replace("VALUES", &list(count, |j| format!("givens[{count}u * i + {j}u]"))));
     }
     if sliced {
         parts.push(SLICES.replace("PROGRESS_AT", &PROGRESS_AT.to_string()));
     }
     if !tables.values.is_empty() {
-        parts.push(format!("@group(0) @binding({TABLES_AT}) var<storage, read> tables: array<f32>;\n"));
+        let table = format!("@group(0) @binding({TABLES_AT}) var<storage, read> tables: array<f32>;\n\n");
+        parts.push(table + "fn number(i: u32) -> f32 { return tables[i]; }\n");
+    }
+    if program.proposal.is_some() {
+        let cover = format!("@group(0) @binding({COVER_AT}) var<storage, read> cover: array<vec4<u32>>;\n\n");
+        parts.push(cover + "fn box_row(i: u32) -> vec4<u32> { return cover[i]; }\n");
     }
     let elements = || program.outputs.iter().map(|output| output.format.dtype);
     if elements().any(|element| element == Dtype::F16) {
@@ -144,39 +147,25 @@ fn shader_with(
     let done = if draws == 2 { "is_done(i) && is_done(i + 1u)" } else { "is_done(i)" };
     let main = kept(MAIN, holds).replace("WORKGROUP", &WORKGROUP.to_string()).replace("ALL_DONE", done);
     parts.push(main.replace("PER_THREAD", &format!("{draws}u")).replace("DRAWS", drawn));
-    (parts.join("\n"), tables)
+    (written(&parts.join("\n"), arithmetic, Zero::Parameter), tables)
 }
 
-/// Whether a line of a fragment is one for draws in one dispatch or in slices, given responses or not.
-fn is_drawn(word: &str, sliced: bool, program: &Program) -> bool {
-    match word {
-        "in_slices" => sliced,
-        "in_one" => !sliced,
-        "sliced" => sliced && program.given == 0,
-        "whole" => !sliced && program.given == 0,
-        "sliced_given" => sliced && program.given > 0,
-        _ => !sliced && program.given > 0,
-    }
-}
-
-/// The functions that make a draw, down to `draw_of`.
+/// The functions that make a draw, down to `draw_of`, with guards: whether in slices, and whether a draw carries a zero.
 pub(super) fn functions(
     program: &Program,
     tables: &Tables,
-    target: Dialect,
-    sliced: bool,
+    (target, form): (Dialect, Arithmetic),
+    (sliced, carries_zero): (bool, bool),
     part: Option<Part>,
 ) -> String {
     let holds = |word: &str| match word {
-        "sliced" | "whole" | "in_slices" | "in_one" | "sliced_given" | "whole_given" => {
-            is_drawn(word, sliced, program)
-        }
-        "given" => program.given > 0,
-        "not_covered" => program.proposal.is_none(),
+        "sliced" => sliced,
+        "whole" => !sliced,
         "scaled" => program.scales(),
         "own_targets" => program.has_own_targets(),
         "covered" => program.proposal.is_some(),
-        "plain" => program.proposal.is_none() && program.given == 0,
+        "plain" => program.proposal.is_none(),
+        "carries_zero" => carries_zero,
         other => unreachable!("draw.wgsl has a line for programs that are {other:?}"),
     };
     let draw = kept(DRAW, holds);
@@ -186,6 +175,8 @@ pub(super) fn functions(
         false => "result.z, key, index, stream",
     };
     let draw = draw.replace("JUDGED", judged).replace("SCALED", scaled);
+    let draw = draw.replace(" GIVEN_PARAMETER", given(program, ", given: Given"));
+    let draw = draw.replace(" GIVEN_ARGUMENT", given(program, ", given"));
     let mut parts = vec![generator_without(target, part), PHYSICAL.to_owned()];
     if let Some(IntensityLaw::LogUniform { .. }) = program.intensity {
         parts.push(LOG_UNIFORM.replace("UNIFORM\n", UNIFORM));
@@ -193,8 +184,13 @@ pub(super) fn functions(
     if program.has_own_targets() {
         parts.push(UNIFORM.to_owned());
     }
-    parts.extend([arithmetic(program, tables, part), draw]);
+    parts.extend([arithmetic(program, tables, form, part), draw]);
     parts.join("\n")
+}
+
+/// A text, where the draws of a program are given responses.
+fn given<'a>(program: &Program, text: &'a str) -> &'a str {
+    if program.given > 0 { text } else { "" }
 }
 
 /// Changes a program to one product in each band, with every normal in use.

@@ -6,7 +6,7 @@ use super::{Dialect, Form, OUTPUTS_AT, Part, draws_per_thread};
 use crate::draw_status::DrawStatus;
 use crate::program::{Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
-use crate::random::real::Arithmetic;
+use crate::random::real::DrawOperations;
 
 /// Packing of an output's values into words of its buffer.
 #[derive(Clone, Copy, PartialEq)]
@@ -110,8 +110,8 @@ impl Store<'_> {
                     Form::Unrolled => format!("{}_over_0({d}.z)", format.quantity),
                     Form::Looped => format!("form(&z_{d}, {}u)", self.tables.units[i]),
                 };
-                let floor = <f32 as Arithmetic>::FLOOR;
-                body.line(&format!("let {}_unit_{d} = 1f / max({over}, {floor:?}f);", format.quantity));
+                let floor = <f32 as DrawOperations>::FLOOR;
+                body.line(&format!("let {}_unit_{d} = ratio(1f, max({over}, {floor:?}f));", format.quantity));
             }
         }
         match self.form {
@@ -142,13 +142,15 @@ impl Store<'_> {
             Source::Intensity => format!("{d}.scale"),
             Source::TargetLrv => format!("{d}.target_lrv"),
             Source::Status if self.program.may_exceed_one() => {
-                let above_one = format!("ok_{d} && peak(worst({d}.z)) * {d}.scale >= 1f");
+                let above_one = format!("ok_{d} && rounded(peak(worst({d}.z)) * {d}.scale) >= 1f");
                 return format!("{d}.attempts | select(0u, {}u, {above_one})", DrawStatus::ABOVE_ONE);
             }
             Source::Status => return format!("{d}.attempts"),
         };
         let value = match (&output.source, output.format.dtype) {
-            (Source::Spectrum, Dtype::F16) => within(value, self.program.value_range()),
+            (Source::Spectrum, Dtype::F16) => {
+                within(&format!("rounded({value})"), self.program.value_range())
+            }
             _ => value,
         };
         format!("select(0f, {value}, ok_{d})")
@@ -250,7 +252,7 @@ impl Store<'_> {
 }
 
 /// A value that is about to be rounded to 16 bits, kept where that leaves it in the interval.
-fn within(value: String, interval: ValueRange) -> String {
+fn within(value: &str, interval: ValueRange) -> String {
     let [least, largest] = interval.halves();
     match largest.is_finite() {
         true => format!("clamp({value}, {least:?}f, {largest:?}f)"),

@@ -5,7 +5,7 @@
 
 use std::sync::OnceLock;
 
-use spectroll::{Engine, EngineChoice, Model, Recipe, RecipeBuilder};
+use spectroll::{ArithmeticChoice, Engine, EngineChoice, Model, Recipe, RecipeBuilder};
 
 /// The best adapter, or the one that `WGPU_ADAPTER_NAME` picks; without one, tests fail.
 pub(crate) fn gpu() -> &'static Engine {
@@ -15,7 +15,19 @@ pub(crate) fn gpu() -> &'static Engine {
     })
 }
 
-/// Whether the adapter is the processor, which neither fuses operations nor rounds in a way of its own.
+/// The same adapter in each form of arithmetic.
+pub(crate) fn forms() -> &'static [Engine; 2] {
+    static FORMS: OnceLock<[Engine; 2]> = OnceLock::new();
+    FORMS.get_or_init(|| {
+        [ArithmeticChoice::Plain, ArithmeticChoice::Exact].map(|arithmetic| {
+            let engine =
+                Engine::new(&EngineChoice::Gpu).unwrap_or_else(|e| panic!("this needs an adapter: {e}"));
+            engine.with_arithmetic(arithmetic)
+        })
+    })
+}
+
+/// Whether the adapter is the processor, which has the CPU's bytes in both forms of arithmetic.
 pub(crate) fn gpu_is_software() -> bool {
     gpu().adapter().is_some_and(|adapter| adapter.kind == "software")
 }

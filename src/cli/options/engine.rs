@@ -3,9 +3,9 @@
 use std::num::NonZeroUsize;
 
 use clap::ValueEnum;
-use spectroll::{Engine, EngineChoice, EngineError};
+use spectroll::{ArithmeticChoice, Engine, EngineChoice, EngineError};
 
-use crate::cli::parse::threads;
+use crate::cli::parse::{share, threads};
 
 /// The kinds of place that can be asked for by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -30,6 +30,12 @@ pub(in crate::cli) struct EngineArguments {
     /// Draw with this number of threads on the CPU [default: one per core]
     #[arg(short, long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
     pub(in crate::cli) threads: Option<NonZeroUsize>,
+    /// The arithmetic of an adapter's shaders
+    #[arg(long, value_enum, default_value = "auto")]
+    arithmetic: ArithmeticChoice,
+    /// Make this share of what an adapter draws again on the CPU, and stop at a difference, as in 1e-4
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share, allow_negative_numbers = true)]
+    verify_draws: f64,
 }
 
 impl EngineArguments {
@@ -43,8 +49,19 @@ impl EngineArguments {
         self.adapter.clone().map(EngineChoice::Adapter).or(named)
     }
 
+    /// Whether the arithmetic or a check of an adapter's draws was asked for.
+    pub(in crate::cli) fn checks_or_chooses_arithmetic(&self) -> bool {
+        self.arithmetic != ArithmeticChoice::default() || self.verify_draws > 0.0
+    }
+
     /// The engine that was asked for.
     pub(in crate::cli) fn open(&self) -> Result<Engine, EngineError> {
-        Engine::with_threads(&self.choice().unwrap_or_default(), self.threads)
+        self.open_as(&self.choice().unwrap_or_default())
+    }
+
+    /// Another engine than was asked for, with the settings that were.
+    pub(in crate::cli) fn open_as(&self, choice: &EngineChoice) -> Result<Engine, EngineError> {
+        let engine = Engine::with_threads(choice, self.threads)?;
+        Ok(engine.with_arithmetic(self.arithmetic).with_recheck(self.verify_draws))
     }
 }

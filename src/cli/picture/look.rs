@@ -34,7 +34,7 @@ impl Picture<'_> {
     pub(in crate::cli) fn drawing(&self) -> Scene {
         let mut drawing = panel::arrange([self.measured(), self.on_grid()], self.theme);
         if let Err(reason) = self.gridded {
-            drawing.elements.extend(place(1).paragraph(&wrapped(reason, 50), self.theme));
+            drawing.elements.extend(place(1).paragraph(&wrapped(reason, 44), self.theme));
         }
         plot::head(&mut drawing, &super::title(self.name), self.note, self.theme);
         drawing

@@ -1,9 +1,9 @@
 //! Sentences of summaries and dry runs that all commands which make data sets share.
 
-use spectroll::Model;
 use spectroll::export::{Destination, Output, Space};
 use spectroll::output::{ByteCount, Schema, SetStatus, Shard};
 use spectroll::wording::{counted, grouped};
+use spectroll::{Engine, Model};
 
 use super::folder_of;
 use crate::cli::folder;
@@ -25,6 +25,20 @@ pub(in crate::cli) fn above_one(above_one: u64, draws: u64, setting: &str) -> Op
     (above_one > 0).then(|| {
         format!("{count} ({share:.2} %) {verb} 1 or more after scaling: use {setting} to keep all below 1")
     })
+}
+
+/// Names the engine that drew, and the arithmetic of an adapter.
+pub(in crate::cli) fn drawn_by(engine: &Engine) -> String {
+    match engine.verdict() {
+        Some(verdict) => format!("{engine}, {verdict}"),
+        None => engine.to_string(),
+    }
+}
+
+/// Says how many draws were made again on the CPU; nothing where none was.
+pub(in crate::cli) fn rechecked(draws: u64) -> Option<String> {
+    (draws > 0)
+        .then(|| format!("{} made again on the CPU, with the same bytes", counted(draws, "draw", "draws")))
 }
 
 /// Sentences of a summary on a model that is not quite what was given, or not quite what its draws are.

@@ -16,6 +16,7 @@ use spectroll::wording::{counted, grouped};
 use super::exit::{Unverified, Usage};
 use super::interrupt;
 use super::options::EngineArguments;
+use super::parse::share;
 use sources::{Request, chunk};
 
 /// Check a .zarr, a folder of parts or a file with a sidecar against its sums, and draw some of it again
@@ -172,11 +173,6 @@ fn chosen(chunks: &[u64], share: f64) -> BTreeSet<u64> {
     let mut random = Stream::named(now, "verify").rng();
     let mut left = chunks.to_vec();
     (0..wanted).map(|_| left.swap_remove((random.next_u64() % left.len() as u64) as usize)).collect()
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    let share = text.parse().ok().filter(|share| (0.0..=1.0).contains(share));
-    share.ok_or_else(|| "expected a share from 0 to 1".to_owned())
 }
 
 /// Lists the chunks that differ from what is drawn now, and the arrays that all rows share if they do.

@@ -178,22 +178,30 @@ impl Sources {
         })
     }
 
-    /// An engine that rounds as the one that drew the set: the one asked for, or the first that does.
+    /// An engine that rounds as the one that drew the set: the one asked for, or the first that does. Sets name their
+    /// rounding where it was not the CPU's; those of earlier versions always do.
     pub(super) fn engine(&self, request: Request) -> anyhow::Result<Engine> {
-        let rounding = match request.sidecar {
-            Some(sidecar) => sidecar.rounding().to_owned(),
-            None => request.read("rounding")?,
+        let rounding: Option<String> = match request.sidecar {
+            Some(sidecar) => sidecar.rounding().map(str::to_owned),
+            None if request.schema.attributes.contains_key("rounding") => Some(request.read("rounding")?),
+            None => None,
         };
         let choice = request.engine.choice();
         for choice in choice.map_or(vec![EngineChoice::Auto, EngineChoice::Cpu], |choice| vec![choice]) {
-            let engine = Engine::with_threads(&choice, request.engine.threads)?;
-            if self.rows(&engine, request.schema)?.rounding()? == rounding {
+            let engine = request.engine.open_as(&choice)?;
+            let mut rows = self.rows(&engine, request.schema)?;
+            let is_alike = match &rounding {
+                Some(rounding) => rows.rounding()? == *rounding,
+                None => engine.is_exact(),
+            };
+            drop(rows);
+            if is_alike {
                 return Ok(engine);
             }
         }
         anyhow::bail!(
-            "{:?} was drawn by an adapter that rounds otherwise than what draws here: choose one with --adapter, \
-             or pass --redraw 0",
+            "{:?} was drawn by an adapter that rounds otherwise than what draws here: choose one with --adapter, or \
+             another --arithmetic, or pass --redraw 0",
             request.path
         )
     }

@@ -132,6 +132,12 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
+/// The text after its first lines.
+fn after(text: &str, skip: usize) -> &str {
+    let start = lines(text).nth(skip).map(|(_, line)| line.as_ptr() as usize - text.as_ptr() as usize);
+    &text[start.unwrap_or(text.len())..]
+}
+
 /// The line without the sign of a comment, and whether it has one.
 fn uncommented(line: &str) -> (&str, bool) {
     let trimmed = line.trim_start_matches(['\u{feff}', ' ', '\t']);
@@ -142,9 +148,7 @@ fn uncommented(line: &str) -> (&str, bool) {
 }
 
 fn plain(text: &str, dialect: Dialect, skip: usize, limit: Option<usize>) -> Result<Sheet, SheetError> {
-    let start =
-        lines(text).nth(skip).map_or(text.len(), |(_, line)| line.as_ptr() as usize - text.as_ptr() as usize);
-    let text = &text[start..];
+    let text = after(text, skip);
     let parts = match limit {
         Some(_) => vec![text],
         None => parts(text),
@@ -164,15 +168,14 @@ fn plain(text: &str, dialect: Dialect, skip: usize, limit: Option<usize>) -> Res
 /// Text in parts of whole lines, for as many threads; one alone where it is short.
 fn parts(text: &str) -> Vec<&str> {
     const LEAST: usize = 1 << 20;
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let size = text.len().div_ceil(threads).max(LEAST);
+    let size = text.len().div_ceil(threads::cores()).max(LEAST);
     let (mut parts, mut rest) = (Vec::new(), text);
     while rest.len() > size {
         let end = rest.as_bytes()[size..].iter().position(|b| matches!(b, b'\n' | b'\r'));
         let Some(end) = end.map(|end| size + end) else { break };
-        let after = if rest.as_bytes()[end..].starts_with(b"\r\n") { end + 2 } else { end + 1 };
+        let next = if rest.as_bytes()[end..].starts_with(b"\r\n") { end + 2 } else { end + 1 };
         // What ends a line is one byte, so that both parts are text.
-        let (part, others) = rest.split_at(after);
+        let (part, others) = rest.split_at(next);
         parts.push(part);
         rest = others;
     }
@@ -241,13 +244,11 @@ fn quoted(
     skip: usize,
     limit: Option<usize>,
 ) -> Result<Option<Sheet>, SheetError> {
-    let start =
-        lines(text).nth(skip).map_or(text.len(), |(_, line)| line.as_ptr() as usize - text.as_ptr() as usize);
     let mut reader = ::csv::ReaderBuilder::new()
         .delimiter(separator)
         .has_headers(false)
         .flexible(true)
-        .from_reader(&text.as_bytes()[start..]);
+        .from_reader(after(text, skip).as_bytes());
     let mut sheet = Sheet::new("line");
     let mut record = ::csv::StringRecord::new();
     // A record's own line, where lines end in any way: the reader counts line feeds alone.

@@ -17,7 +17,7 @@ use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::draw_status::DrawStatus;
 use crate::model::Model;
-use crate::random::real::{Arithmetic, Real};
+use crate::random::real::{DrawOperations, Real};
 use crate::random::stream::{DrawRange, Stream};
 use crate::recipe::Recipe;
 
@@ -269,7 +269,7 @@ macro_rules! altered {
             }
         }
 
-        impl Arithmetic for $name {
+        impl DrawOperations for $name {
             const ZERO: Self = $name(f32::ZERO);
             const ONE: Self = $name(f32::ONE);
             const INFINITY: Self = $name(f32::INFINITY);
@@ -284,7 +284,7 @@ macro_rules! altered {
             }
 
             fn exp2(self) -> Self {
-                $name(Arithmetic::exp2(self.0))
+                $name(DrawOperations::exp2(self.0))
             }
 
             fn truncated(axis: [Self; 4], word: u32) -> [Self; 2] {
