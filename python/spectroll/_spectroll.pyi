@@ -22,6 +22,20 @@ class DataError(ValueError):
 class EngineError(RuntimeError):
     """Draws cannot be made, or not all of them: there is no such adapter, say, or it failed."""
 
+def metamers(
+    model: Model,
+    settings: str,
+    given: str | None,
+    colours: tuple[str, NDArray[np.float64]],
+    draws: tuple[int, int],
+    answers: tuple[str, bool],
+    engine: tuple[str, int | None],
+    spectra: NDArray[np.float32],
+) -> tuple[NDArray[np.uint32], NDArray[np.float32]]: ...
+def sensors(name: str) -> str: ...
+def sensors_of(text: str) -> str: ...
+def illuminant(name: str) -> str: ...
+
 class Model:
     @staticmethod
     def open(name: str, wavelengths: Grid | None = None) -> Model: ...

@@ -24,7 +24,7 @@ const BLOCK: u64 = 1 << 19;
 type Engines = HashMap<(String, usize), Arc<Engine>>;
 
 /// Name, type, width, axis and channels of an array.
-type Format = (&'static str, &'static str, usize, Option<&'static str>, Vec<&'static str>);
+type Format = (&'static str, &'static str, usize, Option<&'static str>, Vec<String>);
 
 /// Open engines. They stay open, as a device takes long to open.
 static ENGINES: PerProcess<Mutex<Engines>> = PerProcess::new();
@@ -148,7 +148,7 @@ impl Sampler {
         let formats = self.recipe.formats().into_iter();
         formats
             .map(|ArrayFormat { quantity, dtype, width, .. }| {
-                (quantity.name(), dtype.name(), width, quantity.axis(), quantity.channels().to_vec())
+                (quantity.name(), dtype.name(), width, quantity.axis(), self.recipe.channels(quantity))
             })
             .collect()
     }
