@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _spectroll
 from ._layout import Arrays
 from ._model import Model
-from ._settings import finite, illuminant_of, intensity_of, lrv_of, sensors_of, shown, target_of
+from ._settings import Engine, engine_of, finite, illuminant_of, intensity_of, lrv_of, sensors_of, shown, target_of
 from ._values import (
     OF_QUANTITIES,
     OF_TARGETS,
@@ -102,26 +102,28 @@ class Sampler:
         the transpose is contiguous. The shape of arrays and their values are the same.
     engine : "auto", "cpu", "gpu", or part of an adapter's name or its index ("auto")
         "auto" is a hardware adapter where there is one, and else the CPU.
+    arithmetic : "auto", "plain" or "exact" ("auto")
+        The arithmetic of an adapter: exact where its compiler fuses or rearranges sums and products, as "auto" finds by a
+        trial against the CPU's draws, so that the bytes are the same on all of them; it takes longer than plain.
     threads : int, optional
         Threads of the CPU engine, one per core unless given. With 1, draws are made on the thread that calls.
 
     Settings that mean nothing to the model's kind, as an `lrv` of illuminants, are a `ValueError`.
 
-    Draw i depends on the model, the settings but `layout`, `engine` and `threads`, the seed, the stream and i, and on nothing
+    Draw i depends on the model, the settings but `layout`, `engine`, `arithmetic` and `threads`, the seed, the stream and i, and on nothing
     else.
 
     Samplers are immutable, can be pickled, and may be used by several threads, and after a fork or in spawned processes:
     each process opens an engine of its own.
     """
 
-    __slots__ = ("_dtype", "_engine", "_layout", "_model", "_natives", "_settings", "_threads")
+    __slots__ = ("_dtype", "_engine", "_layout", "_model", "_natives", "_settings")
 
     _model: Model
     _settings: dict[str, Any]
     _dtype: str
     _layout: str
-    _engine: str
-    _threads: int | None
+    _engine: Engine
     _natives: dict[tuple[str, ...], tuple[_spectroll.Sampler, Arrays]]
 
     def __init__(
@@ -144,6 +146,7 @@ class Sampler:
         dtype: Any = "float32",
         layout: str = "rows",
         engine: str | int = "auto",
+        arithmetic: str = "auto",
         threads: int | None = None,
     ) -> None:
         model = model if isinstance(model, Model) else Model(model)
@@ -166,16 +169,12 @@ class Sampler:
         }
         if settings["xyz"] is not None and len(settings["xyz"]) != 3:
             raise ValueError(f"xyz={xyz!r}: it is three values, X, Y and Z")
-        named = str(engine) if isinstance(engine, int) else engine
-        if not isinstance(named, str) or not named:
-            raise TypeError(f'engine={engine!r}: it is "auto", "cpu", "gpu", or part of an adapter\'s name or its index')
         self._set(
             model,
             settings,
             choice("dtype", np.dtype(dtype).name, DTYPES),
             choice("layout", layout, LAYOUTS),
-            named.lower() if named.lower() in ("auto", "cpu", "gpu") else named,
-            None if threads is None else whole("threads", threads, 1, 2**16),
+            engine_of(engine, threads, arithmetic),
         )
         # What cannot be drawn is refused now, and not with the first draw.
         self._native(("spectra",))
@@ -190,8 +189,7 @@ class Sampler:
         settings: dict[str, Any],
         dtype: str,
         layout: str,
-        engine: str,
-        threads: int | None,
+        engine: Engine,
     ) -> None:
         for name, value in {
             "_model": model,
@@ -199,7 +197,6 @@ class Sampler:
             "_dtype": dtype,
             "_layout": layout,
             "_engine": engine,
-            "_threads": threads,
             "_natives": {},
         }.items():
             object.__setattr__(self, name, value)
@@ -216,9 +213,7 @@ class Sampler:
             # In 16 bits or not makes a difference where spectra are drawn.
             dtype = self._dtype if "spectra" in quantities else "float32"
             text = json.dumps(settings)
-            native = _spectroll.Sampler(
-                self._model._native, text, self._layout, dtype, self._engine, self._threads
-            )
+            native = _spectroll.Sampler(self._model._native, text, self._layout, dtype, self._engine)
             found = native, Arrays(native.formats(), self._layout)
             self._natives[quantities] = found
         return found
@@ -390,7 +385,7 @@ class Sampler:
             (choice("space", space, SPACES), flat),
             (seed_of(seed), count),
             (choice("hard", hard, ("mode", "skip", "error")), bool(nearest)),
-            (self._engine, self._threads),
+            self._engine,
             spectra.reshape(-1),
         )
         if not details:
@@ -446,19 +441,26 @@ class Sampler:
     @property
     def threads(self) -> int | None:
         """Threads of the CPU engine; None is one per core."""
-        return self._threads
+        return self._engine.threads
 
     def with_threads(self, threads: int | None) -> Sampler:
         """The sampler with this number of threads. Its draws are the same."""
         sampler = Sampler.__new__(Sampler)
-        threads = None if threads is None else whole("threads", threads, 1, 2**16)
-        sampler._set(self._model, self._settings, self._dtype, self._layout, self._engine, threads)
+        engine = engine_of(self._engine.name, threads, self._engine.arithmetic)
+        sampler._set(self._model, self._settings, self._dtype, self._layout, engine)
         return sampler
 
-    def wgsl(self, prefix: str = "draw", *, quantities: Quantities = None) -> str:
-        """The draws as functions of WGSL, as text, for shaders of any engine; every name begins with `prefix` and "_". See
+    def wgsl(self, prefix: str = "draw", *, quantities: Quantities = None, arithmetic: str = "plain") -> str:
+        """The draws as functions of WGSL, as text, for shaders of any engine; every name begins with `prefix` and "_". With
+        `arithmetic="exact"` they have the same bytes whatever the shader's compiler does, and take a zero as an argument. See
         `spectroll shader --help` and docs/embedding.md for the functions."""
-        return self._native(quantities_of(quantities)[0])[0].wgsl(prefix)
+        form = choice("arithmetic", arithmetic, ("plain", "exact"))
+        return self._native(quantities_of(quantities)[0])[0].wgsl(prefix, form)
+
+    def wgsl_tables(self, *, quantities: Quantities = None) -> bytes:
+        """The content of the storage buffer that the text of `wgsl` declares, where it declares one: covers, intensities of
+        the data, and models with many bands and components have one, most others none."""
+        return self._native(quantities_of(quantities)[0])[0].tables()
 
     # Other libraries
 
@@ -529,11 +531,11 @@ class Sampler:
         raise AttributeError(f"a sampler is immutable: {name} cannot be set; make another")
 
     def __reduce__(self) -> Any:
-        state = (self._settings, self._dtype, self._layout, self._engine, self._threads)
+        state = (self._settings, self._dtype, self._layout, tuple(self._engine))
         return _restored, (self._model, *state)
 
     def _key(self) -> tuple[Any, ...]:
-        return (json.dumps(self._settings), self._dtype, self._layout, self._engine, self._threads)
+        return (json.dumps(self._settings), self._dtype, self._layout, self._engine)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sampler) and self._key() == other._key() and self._model == other._model
@@ -545,10 +547,9 @@ class Sampler:
         default = {"bounds": "base", "cov_scale": 1.0, "illuminant": "d65", "xyz_scale": "absolute"}
         default |= {"observer": "cie1931"}
         default |= {"proposal": "auto", "max_attempts": 65_000, "dtype": "float32", "layout": "rows"}
-        default |= {"engine": "auto"}
         given = {**self._settings, "dtype": self._dtype, "layout": self._layout}
-        given |= {"engine": self._engine, "threads": self._threads}
         changed = {k: v for k, v in given.items() if v is not None and v != default.get(k)}
+        changed |= self._engine.shown()
         words = ", ".join(f"{name}={shown(value)}" for name, value in changed.items())
         model = repr(self._model.name) if self._model.name else repr(self._model)
         return f"<Sampler {model}{', ' if words else ''}{words}: {100 * self.acceptance:.2f} % accepted>"
@@ -567,8 +568,8 @@ class Sampler:
 
 
 def _restored(
-    model: Model, settings: dict[str, Any], dtype: str, layout: str, engine: str, threads: int | None
+    model: Model, settings: dict[str, Any], dtype: str, layout: str, engine: tuple[str, int | None, str]
 ) -> Sampler:
     sampler = Sampler.__new__(Sampler)
-    sampler._set(model, settings, dtype, layout, engine, threads)
+    sampler._set(model, settings, dtype, layout, Engine(*engine))
     return sampler

@@ -5,13 +5,38 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import _spectroll
 from ._model import Model
-from ._values import choice
+from ._values import choice, whole
+
+
+class Engine(NamedTuple):
+    """What draws, as the native half takes it."""
+
+    name: str
+    threads: int | None
+    arithmetic: str
+
+    def shown(self) -> dict[str, Any]:
+        """The settings that are not the default ones."""
+        default = {"engine": "auto", "threads": None, "arithmetic": "auto"}
+        settings = {"engine": self.name, "threads": self.threads, "arithmetic": self.arithmetic}
+        return {name: value for name, value in settings.items() if value != default[name]}
+
+
+def engine_of(engine: str | int, threads: int | None, arithmetic: str) -> Engine:
+    name = str(engine) if isinstance(engine, int) else engine
+    if not isinstance(name, str) or not name:
+        raise TypeError(f'engine={engine!r}: it is "auto", "cpu", "gpu", or part of an adapter\'s name or its index')
+    return Engine(
+        name.lower() if name.lower() in ("auto", "cpu", "gpu") else name,
+        None if threads is None else whole("threads", threads, 1, 2**16),
+        choice("arithmetic", arithmetic, ("auto", "plain", "exact")),
+    )
 
 
 def shown(value: Any) -> str:

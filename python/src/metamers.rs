@@ -10,7 +10,7 @@ use spectroll::{
 
 use crate::error::{Result, check_signals, value};
 use crate::model::{Model, choice};
-use crate::sampler::EngineRequest;
+use crate::sampler::{EngineRequest, Request};
 
 /// Draws spectra of colours into an array of f32: `each` of every colour, or the most probable one where that is 0. `given`
 /// are sensors as JSON, where colours are responses of these. Returns the kind of the answer to each, and its distance.
@@ -24,7 +24,7 @@ pub(crate) fn metamers<'py>(
     colours: (&str, PyReadonlyArray1<'py, f64>),
     draws: (u64, u64),
     answers: (&str, bool),
-    engine: (&str, Option<usize>),
+    engine: Request,
     mut spectra: PyReadwriteArray1<'py, f32>,
 ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f32>>)> {
     let settings: RecipeSettings = serde_json::from_str(settings).map_err(value)?;
@@ -32,7 +32,7 @@ pub(crate) fn metamers<'py>(
     let hard = choice("hard", answers.0, &all)?;
     let unreachable = if answers.1 { UnreachableColours::Nearest } else { UnreachableColours::Leave };
     let space = choice("space", colours.0, &ColourSpace::NAMED)?;
-    let request = EngineRequest::new(engine.0, engine.1)?;
+    let request = EngineRequest::new(engine)?;
     let given = match given {
         Some(text) => serde_json::from_str(text).map_err(value)?,
         None => Sensors::builtin(settings.observer.name()).expect("every observer is a set of sensors"),

@@ -1,5 +1,7 @@
 """Draws: the bytes of the program's, whatever the quantity, layout and engine, of ranges and of lists of indices."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -283,3 +285,27 @@ def test_the_module_says_what_it_has():
     assert all(getattr(spectroll, name) is not None for name in spectroll.__all__)
     with pytest.raises(AttributeError, match="no attribute 'Smpler'"):
         spectroll.Smpler  # noqa: B018
+
+
+# Arithmetic
+
+
+def test_every_arithmetic_of_an_adapter_has_the_bytes_of_the_cpu():
+    expected = Sampler(lrv=0.4, bounds="scaled", engine="cpu").draw(5000, seed=3)
+    for arithmetic in ("auto", "exact"):
+        sampler = Sampler(lrv=0.4, bounds="scaled", engine="gpu", arithmetic=arithmetic)
+        assert sampler.draw(5000, seed=3).tobytes() == expected.tobytes(), arithmetic
+        assert pickle.loads(pickle.dumps(sampler)) == sampler
+    assert "arithmetic='exact'" in repr(sampler)
+    with pytest.raises(ValueError, match="arithmetic='fast'"):
+        Sampler(arithmetic="fast")
+
+
+def test_shader_text_comes_in_both_forms_with_its_tables():
+    plain = Sampler()
+    assert "fn wall_draw(seed: vec2<u32>, index: vec2<u32>) -> wall_Draw" in plain.wgsl("wall")
+    assert "index: vec2<u32>, zero: u32) -> wall_Draw" in plain.wgsl("wall", arithmetic="exact")
+    assert plain.wgsl_tables() == b""
+    covered = Sampler(lrv=0.99, bounds="scaled")
+    assert "var<storage, read> draw_tables" in covered.wgsl()
+    assert len(covered.wgsl_tables()) > 4 * 2047 and len(covered.wgsl_tables()) % 4 == 0

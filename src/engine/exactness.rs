@@ -31,7 +31,7 @@ const TRIAL_DRAWS: u64 = 65_536;
 const TRIAL_PRODUCTS: f64 = (1u64 << 28) as f64;
 
 /// Choice of the arithmetic in which a device draws.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum ArithmeticChoice {

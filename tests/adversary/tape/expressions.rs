@@ -38,7 +38,7 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    fn expression(&mut self, frame: &mut Frame<'a>, handle: Handle<naga::Expression>) -> Value {
+    pub(super) fn expression(&mut self, frame: &mut Frame<'a>, handle: Handle<naga::Expression>) -> Value {
         let slots = match &frame.function.expressions[handle] {
             E::Literal(literal) => vec![self.literal(literal)],
             E::Constant(constant) => self.global(self.module.constants[*constant].init),
