@@ -40,8 +40,8 @@ fn a_hangup_that_is_ignored_stays_ignored() {
     let folder = tempfile::tempdir().unwrap();
     let run = |trap: &str| {
         let script = format!(
-            "{trap}; {} sample granada -n 3e7 --engine cpu -t 1 -q -o a.npy --force & sleep 0.4; kill -HUP $!; wait $!",
-            PROGRAM
+            "{trap}; {PROGRAM} sample granada -n 3e7 --engine cpu -t 1 -q -o a.npy & \
+             while [ -z \"$(ls -A)\" ]; do sleep 0.02; done; kill -HUP $!; wait $!"
         );
         Command::new("sh").arg("-c").arg(script).current_dir(folder.path()).output().unwrap()
     };
