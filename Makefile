@@ -42,10 +42,10 @@ notebook:
 	target/wheel/venv/bin/python scripts/notebook.py
 
 # What takes minutes: all 2^32 words through the radius and the circle, the statistics under 200 seeds, and the fit on
-# 100,000 matrices and 1,000 small files, a million draws of each kind on devices that take every liberty, and draws on
-# clusters of Dask and Ray.
+# 100,000 matrices and 1,000 small files, a million draws of each kind on devices that take every liberty, a cube of colours,
+# and draws on clusters of Dask and Ray.
 exhaustive: python
-	cargo test --locked --release --lib --test statistics --test fit --test adversary -- --ignored --nocapture
+	cargo test --locked --release --lib --test statistics --test fit --test adversary --test metamers -- --ignored --nocapture
 	test -d target/wheel/venv || $(MAKE) test-python
 	target/wheel/venv/bin/python -m pip install --quiet -r python/tests/requirements-slow.txt
 	target/wheel/venv/bin/python -m pytest -q -m slow
