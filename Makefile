@@ -1,5 +1,5 @@
 # Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
-.PHONY: demo test test-swiftshader test-python wheel notebook exhaustive faults fuzz mutants bench driver python
+.PHONY: demo test test-swiftshader test-python wheel notebook exhaustive faults fuzz mutants bench adapter driver python
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
@@ -84,6 +84,13 @@ bench: driver python
 	cargo build --locked --release
 	$(SPECTROLL_PYTHON) -m pip install --quiet numba
 	$(SPECTROLL_PYTHON) scripts/bench.py
+
+# What a new adapter owes, of the number or with the name in ADAPTER: a report, and rows for docs/measurements.md.
+ADAPTER ?= 0
+adapter: driver
+	cargo build --locked --release
+	target/release/spectroll report --adapter '$(ADAPTER)' -o target/adapter --force
+	@cat target/adapter/adapter.md
 
 # A Vulkan driver: Mesa's software one where there is none.
 driver:
