@@ -714,7 +714,7 @@ fn a_shader_turns_texels_into_the_spectra_of_the_cpu() {
     let texels = texture::texture(width, 48);
     let shaded = texture::shade(&recipe, &texels, width);
     let scalar = recipe.scalar_sampler::<f32>();
-    let stream = Stream::new(u64::from(texture::SEED));
+    let stream = Stream::new(texture::SEED);
     for (i, (shaded, texel)) in shaded.iter().zip(&texels).enumerate() {
         let (x, y) = (i as u64 % u64::from(width), i as u64 / u64::from(width));
         let drawn = scalar.draw_given(stream, y << 32 | x, &texel[..3]);
