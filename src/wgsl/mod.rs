@@ -293,20 +293,21 @@ mod tests {
 
     #[test]
     fn every_variant_is_valid_with_no_more_than_it_says() {
-        for program in programs() {
-            for (target, needs) in [
-                (Dialect::Baseline, Capabilities::empty()),
-                (Dialect::Int64, Capabilities::SHADER_INT64),
-                (Dialect::SoftwareInt64, Capabilities::SHADER_INT64),
-            ] {
-                for (indexing, arithmetic) in VARIANTS {
-                    let variant = ShaderVariant { dialect: target, indexing, arithmetic };
-                    let (text, _) = shader_of(&program, variant);
-                    if let Err(e) = validate(&text, needs) {
-                        panic!("{variant:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
-                    }
-                    assert!(!text.contains("//!") && !text.contains("src/"), "notes for us: {text}");
+        let targets = [
+            (Dialect::Baseline, Capabilities::empty()),
+            (Dialect::Int64, Capabilities::SHADER_INT64),
+            (Dialect::SoftwareInt64, Capabilities::SHADER_INT64),
+        ];
+        for (number, program) in programs().into_iter().enumerate() {
+            for (i, (target, needs)) in targets.into_iter().enumerate() {
+                // Each form with each dialect, but not of every program: there are hundreds.
+                let (indexing, arithmetic) = VARIANTS[(number + i) % 2];
+                let variant = ShaderVariant { dialect: target, indexing, arithmetic };
+                let (text, _) = shader_of(&program, variant);
+                if let Err(e) = validate(&text, needs) {
+                    panic!("{variant:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
                 }
+                assert!(!text.contains("//!") && !text.contains("src/"), "notes for us: {text}");
             }
         }
     }
