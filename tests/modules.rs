@@ -223,7 +223,7 @@ fn any_recipe(rng: &mut StreamRng) -> Option<RecipeBuilder> {
 fn no_recipe_that_can_be_drawn_is_refused() {
     let mut rng = Stream::named(20, "recipes").rng();
     let mut texts = 0;
-    for trial in 0..60 {
+    for trial in 0..24 {
         let Some(recipe) = any_recipe(&mut rng).and_then(|builder| builder.build().ok()) else { continue };
         for arithmetic in [Arithmetic::Plain, Arithmetic::Exact] {
             for tables in [None, Some(TableStorage::Const), Some(BUFFER)] {
@@ -243,5 +243,5 @@ fn no_recipe_that_can_be_drawn_is_refused() {
         }
     }
     println!("{texts} texts");
-    assert!(texts > 100, "{texts} texts");
+    assert!(texts > 50, "{texts} texts");
 }
