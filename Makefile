@@ -17,11 +17,13 @@ demo:
 test: driver python
 	cargo test --locked --release
 
-# The tests that hold an adapter against the CPU, on a second software Vulkan with a compiler of its own.
+# The tests that hold an adapter against the CPU, on a second software Vulkan with a compiler of its own. It draws slowly:
+# `make test-swiftshader SWIFTSHADER_TESTS="lists twins"` has the longest of them.
+SWIFTSHADER_TESTS ?= quantities cover scene embedding guests
 SWIFTSHADER := target/swiftshader/vk_swiftshader_icd.json
 test-swiftshader: driver $(SWIFTSHADER)
 	VK_DRIVER_FILES=$(abspath $(SWIFTSHADER)) VK_ICD_FILENAMES=$(abspath $(SWIFTSHADER)) cargo test --locked --release \
-		--test twins --test quantities --test cover --test lists --test scene --test embedding --test guests
+		$(addprefix --test ,$(SWIFTSHADER_TESTS))
 
 $(SWIFTSHADER): scripts/swiftshader.sh
 	@sh scripts/swiftshader.sh $(dir $@)
