@@ -46,7 +46,7 @@ pub struct Bandwidth {
     pub copy: f64,
     /// Spectra of reflectances that stay on the device, in plain arithmetic.
     pub draw: f64,
-    /// The same in exact arithmetic.
+    /// Spectra that stay on the device, in exact arithmetic.
     pub draw_exact: f64,
     /// Copying a buffer to memory that the host maps, and reading it there.
     pub readback: f64,

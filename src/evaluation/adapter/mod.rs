@@ -1,5 +1,5 @@
-//! What a new adapter owes: its arithmetic, draws of every kind held against the CPU's, the costs of a draw's parts, and how
-//! near drawing comes to what its memory and its bus can do.
+//! Measurements that a new adapter owes: its arithmetic, draws of every kind held against the CPU's, the costs of a draw's
+//! parts, and how near drawing comes to the rates of its memory and of its bus.
 
 mod memory;
 mod rows;
