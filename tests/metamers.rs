@@ -8,7 +8,7 @@ mod program;
 mod texture;
 
 use engines::{cpu, gpu, gpu_is_software};
-use program::{fails, python, succeeds};
+use program::{fails, python, script, succeeds};
 use spectroll::nalgebra::{DMatrix, DVector};
 use spectroll::{
     Answer, AnswerCounts, Draws, Dtype, Engine, EngineError, Grid, HardColours, Illuminant, MetamerError,
@@ -732,15 +732,5 @@ fn a_shader_turns_texels_into_the_spectra_of_the_cpu() {
 #[test]
 fn spectra_of_colours_beside_other_methods() {
     let folder = tempfile::tempdir().expect("there is a place for temporary files");
-    let [tests, data] = ["tests", "data"].map(|name| format!("{}/{name}", env!("CARGO_MANIFEST_DIR")));
-    let code = format!(
-        "import sys, warnings\n\
-         warnings.simplefilter('ignore')\n\
-         sys.dont_write_bytecode = True\n\
-         sys.path.insert(0, {tests:?})\n\
-         import recovery\n\
-         recovery.main({:?}, {data:?}, 200, 2)",
-        program::PROGRAM
-    );
-    println!("{}", python(folder.path(), &code));
+    println!("{}", script(folder.path(), "recovery", ", 200, 2"));
 }

@@ -197,6 +197,16 @@ impl Probe {
     pub const CASES: u32 = CASES;
 }
 
+impl fmt::Display for Probe {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let traits: Vec<_> = self.traits.iter().map(|(found, _)| found.name()).collect();
+        match traits.is_empty() {
+            true => write!(f, "{}", self.verdict),
+            false => write!(f, "{} ({})", self.verdict, traits.join(", ")),
+        }
+    }
+}
+
 /// Tries the arithmetic of a host's device: a self-test in one dispatch, and draws of a built-in model in the plain and,
 /// where need be, the exact form. Submits work and waits for it, which a [`Sampler`] never does: once, when the device is
 /// opened, and before its frames.

@@ -144,26 +144,34 @@ pub(super) fn rate(
 
 /// Bytes a second from a buffer of the device to the host.
 fn readback(engine: &Engine, from: &wgpu::Buffer, to: &wgpu::Buffer) -> Result<f64, EngineError> {
+    Ok(BYTES as f64 / seconds_to_host(engine, &|_| (), from, to)?)
+}
+
+/// Seconds until the host has read a buffer that a pass fills, by way of one that it maps: the median of some runs.
+pub(super) fn seconds_to_host(
+    engine: &Engine,
+    record: &dyn Fn(&mut wgpu::CommandEncoder),
+    from: &wgpu::Buffer,
+    to: &wgpu::Buffer,
+) -> Result<f64, EngineError> {
     let (device, queue) = engine.device().expect("it is an adapter's");
-    let mut sum = 0u64;
-    let mut run = || -> Result<f64, EngineError> {
+    let run = || -> Result<f64, EngineError> {
         let start = Instant::now();
         let mut encoder = device.create_command_encoder(&Default::default());
+        record(&mut encoder);
         encoder.copy_buffer_to_buffer(from, 0, to, 0, None);
         queue.submit([encoder.finish()]);
         to.map_async(wgpu::MapMode::Read, .., |_| {});
         engine.wait()?;
         {
             let view = to.get_mapped_range(..).expect("it is mapped");
-            sum = sum.wrapping_add(bytemuck::cast_slice::<u8, u64>(&view).iter().fold(0, |a, b| a ^ b));
+            std::hint::black_box(bytemuck::cast_slice::<u8, u32>(&view).iter().fold(0, |a, b| a ^ b));
         }
         to.unmap();
-        Ok(BYTES as f64 / start.elapsed().as_secs_f64())
+        Ok(start.elapsed().as_secs_f64())
     };
     run()?;
-    let rates = (0..RUNS).map(|_| run()).collect::<Result<_, _>>()?;
-    std::hint::black_box(sum);
-    Ok(median(rates))
+    Ok(median((0..RUNS).map(|_| run()).collect::<Result<_, _>>()?))
 }
 
 /// Bytes a second of spectra that a session hands to the host.

@@ -3,9 +3,9 @@
 use serde::Serialize;
 use wgpu::BufferUsages;
 
-use super::memory::rate;
-use super::{AdapterError, RUNS, median};
-use crate::engine::{Engine, EngineError};
+use super::AdapterError;
+use super::memory::{rate, seconds_to_host};
+use crate::engine::Engine;
 use crate::model::Model;
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
@@ -44,7 +44,7 @@ fn surfaces() -> Result<Recipe, AdapterError> {
 }
 
 pub(super) fn windows(engine: &Engine) -> Result<Vec<WindowRate>, AdapterError> {
-    let (device, queue) = engine.device().expect("it is an adapter's");
+    let (device, _) = engine.device().expect("it is an adapter's");
     let recipe = surfaces()?;
     let (sampler, format) = (Sampler::new(device, &recipe)?, recipe.formats()[0]);
     let most = sampler.max_count(&device.limits());
@@ -61,25 +61,9 @@ pub(super) fn windows(engine: &Engine) -> Result<Vec<WindowRate>, AdapterError> 
             usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let run = || -> Result<f64, EngineError> {
-            let start = std::time::Instant::now();
-            let mut encoder = device.create_command_encoder(&Default::default());
-            prepared.record(&mut encoder);
-            encoder.copy_buffer_to_buffer(from, 0, &to, 0, None);
-            queue.submit([encoder.finish()]);
-            to.map_async(wgpu::MapMode::Read, .., |_| {});
-            engine.wait()?;
-            {
-                let view = to.get_mapped_range(..).expect("it is mapped");
-                let words: &[u32] = bytemuck::cast_slice(&view);
-                std::hint::black_box(words.iter().fold(0, |a, b| a ^ b));
-            }
-            to.unmap();
-            Ok(draws as f64 / start.elapsed().as_secs_f64())
-        };
-        run()?;
-        let rates = (0..RUNS).map(|_| run()).collect::<Result<_, _>>()?;
-        Ok(WindowRate { mebibytes, draws_per_second: Some(median(rates)) })
+        let record = |encoder: &mut wgpu::CommandEncoder| prepared.record(encoder);
+        let seconds = seconds_to_host(engine, &record, from, &to)?;
+        Ok(WindowRate { mebibytes, draws_per_second: Some(draws as f64 / seconds) })
     };
     WINDOWS.into_iter().map(of_size).collect()
 }
