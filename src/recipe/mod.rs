@@ -45,6 +45,8 @@ pub struct Recipe {
     acceptance: f64,
     /// The size of the cover that candidates are proposed from; `None` of plain rejection.
     cover: Option<CoverSize>,
+    /// Number of the model's centres that have no share of the draws.
+    left_out: usize,
 }
 
 /// Size of a cover: of the boxes that candidates come from where plain rejection finds next to none.
@@ -200,6 +202,12 @@ impl Recipe {
     /// The size of the cover that candidates are proposed from; `None` of plain rejection.
     pub fn cover(&self) -> Option<CoverSize> {
         self.cover
+    }
+
+    /// Number of measured spectra, or of a mixture's components, that have no share of the draws: about which fewer than 1
+    /// in 64 spectra would be accepted. 0 of Gaussian models.
+    pub fn left_out(&self) -> usize {
+        self.left_out
     }
 
     /// Range of values that its spectra may take.

@@ -15,12 +15,14 @@ mod cover;
 mod guards;
 #[cfg(test)]
 pub(crate) mod layout;
+mod mixture;
 mod module;
 // Only measurements leave parts out.
 #[cfg_attr(not(feature = "report"), allow(dead_code, unreachable_pub))]
 mod part;
 #[cfg(test)]
 mod probe;
+mod proposal;
 mod self_test;
 mod shader;
 mod store;
@@ -59,11 +61,11 @@ pub(crate) const TABLES_AT: u32 = 1;
 /// The binding of the first quantity; that of another is its number more.
 pub(crate) const OUTPUTS_AT: u32 = 2;
 
-/// The binding of a cover's boxes.
-pub(crate) const COVER_AT: u32 = OUTPUTS_AT + Quantity::COUNT as u32;
+/// The binding of a cover's boxes or a model's centres.
+pub(crate) const PROPOSAL_AT: u32 = OUTPUTS_AT + Quantity::COUNT as u32;
 
 /// The binding of the progress of draws that one dispatch may not end.
-pub(crate) const PROGRESS_AT: u32 = COVER_AT + 1;
+pub(crate) const PROGRESS_AT: u32 = PROPOSAL_AT + 1;
 
 /// The binding of the indices of draws, where these are given in a list.
 pub(crate) const INDICES_AT: u32 = PROGRESS_AT + 1;

@@ -10,7 +10,7 @@ use super::writer::{Text, float, list};
 use super::{Arithmetic, Dialect, Form};
 use crate::dataset::SpectrumKind;
 use crate::grid::Grid;
-use crate::program::{Program, Source, Unit};
+use crate::program::{Program, Proposal, Source, Unit};
 use crate::quantity::Quantity;
 use crate::random::real::DrawOperations;
 
@@ -59,11 +59,11 @@ impl ModuleOptions {
     pub const MOST_CONSTANT_BYTES: usize = 4 * MOST_CONSTANTS;
 }
 
-/// Words of the tables that a program's module reads, numbers and then boxes; none of most programs.
+/// Words of the tables that a program's module reads, numbers and then boxes or centres; none of most programs.
 pub(crate) fn table_words(program: &Program) -> Vec<u32> {
     let numbers = Tables::new(program).values.into_iter().map(f32::to_bits);
-    let boxes = program.proposal.iter().flat_map(|proposal| proposal.rounded::<f32>().words());
-    numbers.chain(boxes.flatten()).collect()
+    let rows = program.proposal.iter().flat_map(Proposal::words);
+    numbers.chain(rows.flatten()).collect()
 }
 
 /// The module of a program on a grid.
@@ -131,7 +131,7 @@ fn storage(program: &Program, numbers: usize, storage: Option<TableStorage>) -> 
         });
     }
     if program.proposal.is_some() {
-        text.block("fn box_row(i: u32) -> vec4<u32>", |body| {
+        text.block("fn proposal_row(i: u32) -> vec4<u32>", |body| {
             body.line(&format!("let at = {numbers}u + 4u * i;"));
             body.line(&format!(
                 "return vec4({name}[at], {name}[at + 1u], {name}[at + 2u], {name}[at + 3u]);"
