@@ -162,7 +162,8 @@ mod tests {
     use crate::affine::Affine;
     use crate::dataset::SpectrumKind;
     use crate::grid::Grid;
-    use crate::program::{self, Bounds, IntensityLaw, LrvLaw, Source, Unit};
+    use crate::mixture::{Centres, Mixture, Spread, triangle};
+    use crate::program::{self, Bounds, IntensityLaw, LrvLaw, Proposal, Source, Unit};
     use crate::quantity::{ArrayFormat, Layout};
 
     /// A program of 3 bands and 2 components, small enough to read.
@@ -196,6 +197,13 @@ mod tests {
             given: 0,
         }
         .with_status()
+    }
+
+    /// Two centres.
+    fn mixture(components: usize, spread: Spread<f64>) -> Mixture<f64> {
+        let coordinates = (0..2 * components).map(|i| 0.25 * i as f64).collect();
+        let centres = Centres { coordinates, spread, shares: vec![1.0, 3.0], components };
+        centres.within(&[]).expect("nothing is rejected").0
     }
 
     /// The program with all that can come out of it, so laid.
@@ -279,6 +287,13 @@ mod tests {
             }
             let targets = laws.into_iter().flat_map(|law| rules.map(|bounds| Some((law, bounds))));
             programs.extend([None].into_iter().chain(targets).map(|t| of(SpectrumKind::Reflectance, t)));
+            for spread in [Spread::Same(0.3), Spread::Own(vec![0.25; 2 * triangle(components)])] {
+                let proposal = Some(Proposal::Centres(mixture(components, spread)));
+                let plain = of(SpectrumKind::Reflectance, None);
+                programs.push(Program { proposal: proposal.clone(), ..plain });
+                let scaled = of(SpectrumKind::Reflectance, Some((LrvLaw::Fixed(0.4), Bounds::Scaled)));
+                programs.push(Program { proposal, ..scaled });
+            }
             if components > 1 {
                 programs.push(Program { given: components / 2, ..of(SpectrumKind::Reflectance, None) });
             }
@@ -359,6 +374,9 @@ mod tests {
         let level = IntensityLaw::LogUniform { low: 0.15, octaves: 10.0 };
         let lamp = || Program { intensity: Some(level.clone()), ..light() };
         let lamps = || Program { intensity: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..light() };
+        let about = |spread, program| {
+            Program { proposal: Some(Proposal::Centres(mixture(2, spread))), ..program }
+        };
         let generated = |program: &Program, target| {
             let tables = Tables::new(program);
             let text = arithmetic(program, &tables, Arithmetic::Plain, None)
@@ -380,6 +398,16 @@ mod tests {
                 "reflectance_in_halves",
                 with_all(surface(None), Layout::PaddedRows, Dtype::F16),
                 Dialect::Int64,
+            ),
+            (
+                "kernel",
+                about(Spread::Same(0.3), only(surface(None), Quantity::Weights)),
+                Dialect::Baseline,
+            ),
+            (
+                "mixture",
+                about(Spread::Own(vec![0.25; 6]), only(surface(None), Quantity::Weights)),
+                Dialect::Baseline,
             ),
             ("weights", only(surface(None), Quantity::Weights), Dialect::Baseline),
             ("xyz", only(surface(None), Quantity::Xyz), Dialect::Baseline),

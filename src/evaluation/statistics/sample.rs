@@ -3,10 +3,11 @@
 use rayon::prelude::*;
 
 use super::tinted::tinted;
-use crate::dataset::SpectrumKind;
+use crate::dataset::{BuiltinTable, Dataset, SpectrumKind};
 use crate::draw_status::DrawStatus;
 use crate::engine::{Batch, Engine, EngineError};
-use crate::model::Model;
+use crate::grid::{Extrapolation, Grid};
+use crate::model::{Fit, FitDistribution, Model};
 use crate::program::Bounds;
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
@@ -31,6 +32,7 @@ impl Scenario {
     /// Every kind of recipe, on the built-in models and on one with properties that no fit gives.
     pub fn all() -> Vec<Scenario> {
         let reflectances = || Model::builtin("munsell-vrhel").expect("it is built in");
+        let kernel = || Model::builtin("munsell-vrhel-kernel").expect("it is built in");
         let daylights = Model::builtin("granada").expect("it is built in");
         let scenario =
             |name: &str, model, target, scale| Scenario { name: name.to_owned(), model, target, scale };
@@ -45,6 +47,9 @@ impl Scenario {
             scenario("LRV 0.6, scaled", reflectances(), Some((0.6, Bounds::Scaled)), 1.0),
             scenario("LRV 0.6, both", reflectances(), Some((0.6, Bounds::Both)), 1.0),
             scenario("illuminants", daylights, None, 1.0),
+            scenario("kernel", kernel(), None, 1.0),
+            scenario("kernel, LRV 0.6, scaled", kernel(), Some((0.6, Bounds::Scaled)), 1.0),
+            scenario("mixture", lamps(), None, 1.0),
         ]
     }
 
@@ -75,6 +80,13 @@ impl Scenario {
             _ => 1.0,
         }
     }
+}
+
+/// Lamps in four clusters, each with a covariance of its own.
+fn lamps() -> Model {
+    let data = Dataset::new(&[BuiltinTable::Houser.table()], Grid::DEFAULT, Extrapolation::Error);
+    let fit = Fit::new(SpectrumKind::Illuminant).distribution(FitDistribution::Mixture(4));
+    fit.fit(&data.expect("the table has these wavelengths")).expect("lamps can be fitted")
 }
 
 /// One spectrum, and the number of candidates it took.
