@@ -39,7 +39,11 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
     if path.is_dir() {
         return folder::read(path, options);
     }
-    let bytes = files::read(path)?;
+    from_bytes(path, files::read(path)?, options)
+}
+
+/// Reads the bytes of a file; `path` is what messages call it, and where files are looked for that belong to it.
+pub(super) fn from_bytes(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Reading, DatasetError> {
     if is_hdf5(&bytes) {
         return choose(path, hdf5_bytes(path, bytes)?, options);
     }
