@@ -12,6 +12,6 @@ if ! python3 -c 'import venv, ensurepip' 2>/dev/null; then
     DEBIAN_FRONTEND=noninteractive $root apt-get install -y -qq python3-venv >/dev/null
 fi
 python3 -m venv "$1"
-"$1/bin/python" -m pip install --quiet numpy scipy h5py pandas pyarrow xarray zarr openpyxl
+"$1/bin/python" -m pip install --quiet numpy scipy h5py pandas pyarrow xarray zarr openpyxl colour-science
 # Mitsuba is a large download, and one test's: SPECTROLL_MITSUBA=1 asks for both.
 [ -z "${SPECTROLL_MITSUBA:-}" ] || "$1/bin/python" -m pip install --quiet mitsuba

@@ -18,14 +18,14 @@ struct Draw {
     zero: u32, // if carries_zero
 }
 
-fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, max_attempts: u32) -> Draw { // if whole
-fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, first: u32, end: u32) -> Draw { // if sliced
+fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, max_attempts: u32 GIVEN_PARAMETER) -> Draw { // if whole
+fn draw_of(key: vec2<u32>, index: vec2<u32>, stream: u32, first: u32, end: u32 GIVEN_PARAMETER) -> Draw { // if sliced
     var result: Draw;
     result.target_lrv = target_lrv_of(key, index, stream); // if own_targets
     for (var attempt = 0u; attempt < max_attempts && result.attempts == 0u; attempt++) { // if whole
     var attempt = first; // if sliced
     for (; attempt < end && result.attempts == 0u; attempt++) { // if sliced
-        let z = normals(key, index, stream, attempt); // if plain
+        let z = normals(key, index, stream, attempt GIVEN_ARGUMENT); // if plain
         let accepted = is_accepted(JUDGED); // if plain
         let c = candidate(key, index, stream, attempt); // if covered
         let z = c.z; // if covered

@@ -21,6 +21,8 @@ struct Parameters {
 @group(0) @binding(0) var<uniform> parameters: Parameters;
 // The draws, each by the words of its index, where they are those of a list. // if listed
 @group(0) @binding(INDICES_AT) var<storage, read> indices: array<vec2<u32>>; // if listed
+// The responses that each draw is given, draw by draw. // if given
+@group(0) @binding(GIVEN_AT) var<storage, read> givens: array<f32>; // if given
 
 // Draw i of the range.
 fn draw_at(i: u32) -> Draw {
@@ -31,12 +33,12 @@ fn draw_at(i: u32) -> Draw {
     if parameters.row != 0u { // if ranged
         index = vec2(low % parameters.row, parameters.first.y + low / parameters.row); // if ranged
     } // if ranged
-    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts); // if whole
+    return draw_of(parameters.key, index, parameters.stream, parameters.max_attempts GIVEN_ARGUMENT); // if whole
     let before = progress[i]; // if sliced
     let attempts = attempts_of(before); // if sliced
     let first = select(before & ~UNDONE, attempts - 1u, attempts != 0u); // if sliced
     let end = select(min(first + parameters.slice, parameters.max_attempts), attempts, attempts != 0u); // if sliced
-    let drawn = draw_of(parameters.key, index, parameters.stream, first, end); // if sliced
+    let drawn = draw_of(parameters.key, index, parameters.stream, first, end GIVEN_ARGUMENT); // if sliced
     progress[i] = select(drawn.tried | UNDONE, drawn.attempts, drawn.attempts != 0u); // if sliced
     return drawn; // if sliced
 }

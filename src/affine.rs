@@ -25,6 +25,15 @@ impl Affine {
         Affine { offset: vec![self.offset[number]], gain }
     }
 
+    /// Returns the map of the other inputs, where the first of them have these values.
+    pub(crate) fn at(&self, first: &[f64]) -> Affine {
+        let mut offset = self.offset.clone();
+        for (gain, value) in self.gain.iter().zip(first) {
+            offset.iter_mut().zip(gain).for_each(|(offset, gain)| *offset += gain * value);
+        }
+        Affine { offset, gain: self.gain[first.len()..].to_vec() }
+    }
+
     /// Returns the map that is `value` whatever z is.
     pub(crate) fn constant(value: f64, components: usize) -> Affine {
         Affine { offset: vec![value], gain: vec![vec![0.0]; components] }

@@ -16,6 +16,8 @@ mod dataset;
 
 pub mod colorimetry;
 
+mod sensors;
+
 mod affine;
 mod draw_status;
 mod quantity;
@@ -37,6 +39,8 @@ mod sampler;
 
 mod engine;
 
+mod metamers;
+
 pub mod scene;
 
 pub mod output;
@@ -56,6 +60,8 @@ mod pages {
     mod scenes {}
     #[doc = include_str!("../docs/embedding.md")]
     mod embedding {}
+    #[doc = include_str!("../docs/metamers.md")]
+    mod metamers {}
 }
 
 // The program, which other hosts may carry as well, as the Python package does. It names the library as they do.
@@ -65,6 +71,7 @@ extern crate self as spectroll;
 #[doc(hidden)]
 pub mod cli;
 
+pub use colorimetry::{Illuminant, IlluminantError, Observer};
 pub use dataset::{
     BuiltinTable, Dataset, DatasetError, Decimal, Missing, ReadOptions, Reading, Remedy, ResampleMethod,
     Resampling, Separator, SpectraCounts, SpectrumKind, Table, TableLayout, Unphysical, WavelengthUnit,
@@ -75,6 +82,10 @@ pub use engine::{
     Probe, ProbedAdapter, Session, WantedAdapter, adapters, probe, probed_adapters, wanted_backends,
 };
 pub use grid::{Extrapolation, Grid, GridError};
+pub use metamers::{
+    Answer, AnswerCounts, ColourConversion, ColourSpace, HardColours, MetamerError, MetamerWindow, Metamers,
+    UnreachableColours,
+};
 pub use model::{BuiltinData, Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};
 pub use program::Bounds;
 pub use quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
@@ -82,10 +93,11 @@ pub use random::philox::philox;
 pub use random::real::Real;
 pub use random::stream::{DrawRange, Draws, Stream, StreamRng};
 pub use recipe::{
-    CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Illuminant, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder,
-    RecipeError, RecipeSettings, ScalarSampler, XyzScale,
+    CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder, RecipeError,
+    RecipeSettings, ResponseTarget, ScalarSampler, XyzScale,
 };
 pub use sampler::{PrepareOptions, Prepared, Sampler, SamplerError, SamplerOptions};
+pub use sensors::{MAX_SENSORS, ResponseScale, SensorError, Sensors};
 pub use threads::ThreadError;
 // What stands in signatures, so that hosts take the same versions.
 pub use wgsl::{

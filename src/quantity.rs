@@ -13,25 +13,31 @@ pub enum Quantity {
     Spectra,
     /// The k weights of the model's components, for the spectrum before scaling.
     Weights,
-    /// CIE 1931 tristimulus values X, Y, Z (2 degree observer): of a reflectance under an illuminant, where a perfect
-    /// white has Y = 1; of an illuminant its own.
+    /// Tristimulus values X, Y, Z of the recipe's observer (CIE 1931, 2 degrees, unless asked otherwise): of a reflectance
+    /// under an illuminant, where a perfect white has Y = 1; of an illuminant its own.
     Xyz,
     /// Linear Rec. 709 components R, G, B (IEC 61966-2-1) of the tristimulus values, unclamped: outside the gamut
     /// they are negative or above 1. The matrix is that of D65, and nothing is adapted to another white.
     LinearSrgb,
-    /// The luminous reflectance (LRV) of a reflectance: CIE Y of the 1931 2 degree observer under D65, 1 for a
-    /// perfect white.
+    /// The luminous reflectance (LRV) of a reflectance: CIE Y of the recipe's observer under its illuminant (1931, 2
+    /// degrees, and D65 unless asked otherwise), 1 for a perfect white.
     Lrv,
     /// The [`DrawStatus`](crate::DrawStatus), which has the number of candidates that the draw took.
     Attempts,
     /// The factor that an illuminant was multiplied by.
     Intensity,
-    /// CIE 1931 chromaticity x and y, of the tristimulus values, whatever their scale.
+    /// Chromaticity x and y, of the tristimulus values, whatever their scale.
     Chromaticity,
+    /// Responses of a set of sensors, one a channel: to a reflectance under an illuminant, or to an illuminant itself.
+    Responses,
+    /// The light that a surface sends to the eye, by band: its reflectance times each of the lights of its scene.
+    #[cfg_attr(feature = "cli", value(skip))] // scenes alone have it
+    ColorSignal,
 }
 
 impl Quantity {
-    /// Every quantity.
+    /// Every quantity but [`Responses`](Quantity::Responses), which take a set of sensors, and
+    /// [`ColorSignal`](Quantity::ColorSignal), which takes the lights of a scene.
     pub const ALL: &[Quantity] = &[
         Quantity::Spectra,
         Quantity::Weights,
@@ -46,20 +52,22 @@ impl Quantity {
     /// The quantities that tristimulus values give.
     pub(crate) const COLOURS: &[Quantity] = &[Quantity::Xyz, Quantity::LinearSrgb, Quantity::Chromaticity];
 
-    /// Number of quantities.
-    pub(crate) const COUNT: usize = Quantity::ALL.len();
+    /// Number of quantities, those of sensors and scenes included.
+    pub(crate) const COUNT: usize = Quantity::ColorSignal as usize + 1;
 
     /// Name of the axis of its values within a draw, in files; `None` where a draw has one value.
     pub fn axis(self) -> Option<&'static str> {
         match self {
-            Quantity::Spectra => Some("wavelength"),
+            Quantity::Spectra | Quantity::ColorSignal => Some("wavelength"),
+            Quantity::Responses => Some("sensor"),
             Quantity::Weights => Some("component"),
             Quantity::Xyz | Quantity::LinearSrgb | Quantity::Chromaticity => Some("channel"),
             Quantity::Lrv | Quantity::Attempts | Quantity::Intensity => None,
         }
     }
 
-    /// Names of its values, where each has one of its own.
+    /// Names of its values, where each has one of its own, whatever the recipe; those of responses are those of the
+    /// sensors ([`Recipe::channels`](crate::Recipe::channels)).
     pub fn channels(self) -> &'static [&'static str] {
         match self {
             Quantity::Xyz => &["X", "Y", "Z"],
@@ -80,6 +88,8 @@ impl Quantity {
             Quantity::Attempts => "attempts",
             Quantity::Intensity => "intensity",
             Quantity::Chromaticity => "chromaticity",
+            Quantity::Responses => "responses",
+            Quantity::ColorSignal => "color_signal",
         }
     }
 }

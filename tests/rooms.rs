@@ -9,7 +9,7 @@ use std::path::Path;
 use sources::sources;
 
 /// Every room, in order. `lib.rs` and `main.rs`, which see them all, are none.
-const ROOMS: [&str; 25] = [
+const ROOMS: [&str; 27] = [
     "caught",
     "plain_file",
     "suggestion",
@@ -18,6 +18,7 @@ const ROOMS: [&str; 25] = [
     "grid",
     "dataset",
     "colorimetry",
+    "sensors",
     "affine",
     "draw_status",
     "quantity",
@@ -30,6 +31,7 @@ const ROOMS: [&str; 25] = [
     "recipe",
     "sampler",
     "engine",
+    "metamers",
     "scene",
     "output",
     "export",

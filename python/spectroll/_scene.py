@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _spectroll
+from ._settings import engine_of
 from ._values import whole
 
 
@@ -32,7 +33,7 @@ class Scene:
     name : str or path
     seed : int, optional
         Takes the place of the file's.
-    engine, threads
+    engine, arithmetic, threads
         Those of `Sampler`.
 
     `scenes(0, 100)` draws a hundred scenes. Scenes are immutable and can be pickled, and may be used after a fork.
@@ -46,14 +47,14 @@ class Scene:
         *,
         seed: int | None = None,
         engine: str | int = "auto",
+        arithmetic: str = "auto",
         threads: int | None = None,
     ) -> None:
         path = os.fspath(name)
         seed = None if seed is None else whole("seed", seed)
-        threads = None if threads is None else whole("threads", threads, 1, 2**16)
         if os.path.exists(path):
             path = os.path.abspath(path)  # what is pickled may be opened from another folder
-        self._arguments = (path, seed, str(engine), threads)
+        self._arguments = (path, seed, tuple(engine_of(engine, threads, arithmetic)))
         self._native = _spectroll.Scene(*self._arguments)
         self._wavelengths = self._native.wavelengths
         self._wavelengths.flags.writeable = False
@@ -111,5 +112,6 @@ class Scene:
         return f"<Scene {os.path.basename(self._arguments[0])!r}: {len(self)} scenes of {groups}; seed {self.seed}>"
 
 
-def _restored(path: str, seed: int | None, engine: str, threads: int | None) -> Scene:
-    return Scene(path, seed=seed, engine=engine, threads=threads)
+def _restored(path: str, seed: int | None, engine: tuple[str, int | None, str]) -> Scene:
+    name, threads, arithmetic = engine
+    return Scene(path, seed=seed, engine=name, threads=threads, arithmetic=arithmetic)

@@ -14,6 +14,7 @@ EXAMPLES: list[str]
 Grid = str | list[float]
 Table = tuple[NDArray[np.float64], NDArray[np.float64], str]
 Source = tuple[int, str | None]
+Engine = tuple[str, int | None, str]
 Progress = Callable[[int | None, int], object] | None
 
 class DataError(ValueError):
@@ -21,6 +22,20 @@ class DataError(ValueError):
 
 class EngineError(RuntimeError):
     """Draws cannot be made, or not all of them: there is no such adapter, say, or it failed."""
+
+def metamers(
+    model: Model,
+    settings: str,
+    given: str | None,
+    colours: tuple[str, NDArray[np.float64]],
+    draws: tuple[int, int],
+    answers: tuple[str, bool],
+    engine: Engine,
+    spectra: NDArray[np.float32],
+) -> tuple[NDArray[np.uint32], NDArray[np.float32]]: ...
+def sensors(name: str) -> str: ...
+def sensors_of(text: str) -> str: ...
+def illuminant(name: str) -> str: ...
 
 class Model:
     @staticmethod
@@ -67,8 +82,7 @@ class Sampler:
         settings: str,
         layout: str,
         dtype: str,
-        engine: str,
-        threads: int | None,
+        engine: Engine,
     ) -> None: ...
     @property
     def acceptance(self) -> float: ...
@@ -76,14 +90,15 @@ class Sampler:
     def probability(self) -> float: ...
     def engine(self) -> str: ...
     def formats(self) -> list[tuple[str, str, int, str | None, list[str]]]: ...
-    def wgsl(self, prefix: str) -> str: ...
+    def wgsl(self, prefix: str, arithmetic: str) -> str: ...
+    def tables(self) -> bytes: ...
     def fill(self, first: int, count: int, source: Source, arrays: list[NDArray[np.uint8]]) -> tuple[int, int, int]: ...
     def fill_at(
         self, indices: NDArray[np.uint64], source: Source, arrays: list[NDArray[np.uint8]]
     ) -> tuple[int, int, int]: ...
 
 class Scene:
-    def __init__(self, name: str, seed: int | None, engine: str, threads: int | None) -> None: ...
+    def __init__(self, name: str, seed: int | None, engine: Engine) -> None: ...
     @property
     def count(self) -> int: ...
     @property

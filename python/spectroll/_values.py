@@ -16,12 +16,17 @@ Wavelengths = str | ArrayLike
 
 LAST = 2**64 - 1
 
-QUANTITIES = ("spectra", "weights", "xyz", "linear_srgb", "lrv", "attempts", "intensity", "chromaticity")
+QUANTITIES = ("spectra", "weights", "xyz", "linear_srgb", "lrv", "attempts", "intensity", "chromaticity", "responses")
 # Settings that mean something to some quantities alone, which the library refuses beside others: their defaults, and these.
 OF_QUANTITIES = {
-    "illuminant": ("d65", frozenset({"xyz", "linear_srgb", "chromaticity"})),
+    "illuminant": ("d65", frozenset({"xyz", "linear_srgb", "chromaticity", "lrv", "responses"})),
+    "observer": ("cie1931", frozenset({"xyz", "linear_srgb", "chromaticity", "lrv"})),
+    "sensors": (None, frozenset({"responses"})),
+    "response_scale": (None, frozenset({"responses"})),
     "xyz_scale": ("absolute", frozenset({"xyz", "linear_srgb"})),
 }
+# Settings among them that also say what a target is, each with the targets that it means something to.
+OF_TARGETS = {"illuminant": ("lrv", "xyz", "target"), "observer": ("lrv", "xyz")}
 
 
 def whole(name: str, value: Any, least: int = 0, most: int = LAST) -> int:

@@ -13,7 +13,7 @@ use spectroll::export::{ExportError, SelectionError};
 use spectroll::output::OutputError;
 use spectroll::scene::SceneError;
 use spectroll::{
-    DatasetError, FitError, GridError, ModelError, RecipeError, Remedy, SamplerError, WgslError,
+    DatasetError, FitError, GridError, ModelError, RecipeError, Remedy, SamplerError, SensorError, WgslError,
 };
 
 create_exception!(
@@ -77,7 +77,7 @@ macro_rules! values {
     };
 }
 
-values!(RecipeError, GridError, WgslError, SceneError, SelectionError, SamplerError);
+values!(RecipeError, SensorError, GridError, WgslError, SceneError, SelectionError, SamplerError);
 
 impl From<spectroll::EngineError> for Error {
     fn from(error: spectroll::EngineError) -> Error {
@@ -187,6 +187,7 @@ impl From<ExportError> for Error {
             ExportError::Interrupted => {
                 Error(PyKeyboardInterrupt::new_err("interrupted; nothing was left behind"))
             }
+            ExportError::Metamers(error) => value(error),
             ExportError::Unfinished { ref cause, .. } if matches!(**cause, ExportError::Interrupted) => {
                 Error(PyKeyboardInterrupt::new_err(format!("{error}: pass resume=True to go on")))
             }

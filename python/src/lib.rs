@@ -5,11 +5,13 @@
 
 mod data;
 mod error;
+mod metamers;
 mod model;
 mod process;
 mod program;
 mod sampler;
 mod scene;
+mod sensors;
 mod write;
 
 use pyo3::prelude::pymodule;
@@ -22,6 +24,8 @@ mod _spectroll {
     #[pymodule_export]
     use crate::error::{DataError, EngineError};
     #[pymodule_export]
+    use crate::metamers::metamers;
+    #[pymodule_export]
     use crate::model::Model;
     #[pymodule_export]
     use crate::program::{adapters, main};
@@ -29,6 +33,8 @@ mod _spectroll {
     use crate::sampler::Sampler;
     #[pymodule_export]
     use crate::scene::Scene;
+    #[pymodule_export]
+    use crate::sensors::{illuminant, sensors, sensors_of};
     #[pymodule_export]
     use crate::write::{write_draws, write_scenes};
 

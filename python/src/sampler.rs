@@ -6,11 +6,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use self_cell::self_cell;
 
 use spectroll::{
-    ArrayFormat, DrawStatus, DrawSummary, Draws, Dtype, Engine, EngineChoice, Layout, Quantity, Recipe,
-    RecipeSettings, Session, Stream,
+    Arithmetic, ArithmeticChoice, ArrayFormat, DrawStatus, DrawSummary, Draws, Dtype, Engine, EngineChoice,
+    Layout, ModuleOptions, Quantity, Recipe, RecipeSettings, Session, Stream,
 };
 
 use crate::error::{Error, Result, check_signals, value};
@@ -20,11 +21,14 @@ use crate::process::PerProcess;
 /// Number of draws between two looks at whether somebody pressed Ctrl-C: some 20 ms.
 const BLOCK: u64 = 1 << 19;
 
-/// Engines by their choice and number of threads.
-type Engines = HashMap<(String, usize), Arc<Engine>>;
+/// Name of an engine, its number of threads, and the name of its arithmetic.
+pub(crate) type Request<'a> = (&'a str, Option<usize>, &'a str);
+
+/// Engines by their choice, number of threads and arithmetic.
+type Engines = HashMap<(String, usize, ArithmeticChoice), Arc<Engine>>;
 
 /// Name, type, width, axis and channels of an array.
-type Format = (&'static str, &'static str, usize, Option<&'static str>, Vec<&'static str>);
+type Format = (&'static str, &'static str, usize, Option<&'static str>, Vec<String>);
 
 /// Open engines. They stay open, as a device takes long to open.
 static ENGINES: PerProcess<Mutex<Engines>> = PerProcess::new();
@@ -35,10 +39,11 @@ pub(crate) struct EngineRequest {
     name: String,
     choice: EngineChoice,
     threads: Option<NonZeroUsize>,
+    arithmetic: ArithmeticChoice,
 }
 
 impl EngineRequest {
-    pub(crate) fn new(name: &str, threads: Option<usize>) -> Result<EngineRequest> {
+    pub(crate) fn new((name, threads, arithmetic): Request) -> Result<EngineRequest> {
         let choice = match name {
             "auto" => EngineChoice::Auto,
             "cpu" => EngineChoice::Cpu,
@@ -49,17 +54,24 @@ impl EngineRequest {
             NonZeroUsize::new(count)
                 .ok_or_else(|| value("threads=0: it is at least 1, or None for one per core"))
         });
-        Ok(EngineRequest { name: name.to_owned(), choice, threads: threads.transpose()? })
+        let forms = [
+            ("auto", ArithmeticChoice::Auto),
+            ("plain", ArithmeticChoice::Plain),
+            ("exact", ArithmeticChoice::Exact),
+        ];
+        let arithmetic = self::choice("arithmetic", arithmetic, &forms)?;
+        Ok(EngineRequest { name: name.to_owned(), choice, threads: threads.transpose()?, arithmetic })
     }
 
     /// The engine of this process.
     pub(crate) fn engine(&self) -> Result<Arc<Engine>> {
         let mut engines = lock(ENGINES.get());
-        let key = (self.name.clone(), self.threads.map_or(0, NonZeroUsize::get));
+        let key = (self.name.clone(), self.threads.map_or(0, NonZeroUsize::get), self.arithmetic);
         if let Some(engine) = engines.get(&key) {
             return Ok(engine.clone());
         }
-        let engine = Arc::new(Engine::with_threads(&self.choice, self.threads)?);
+        let engine = Engine::with_threads(&self.choice, self.threads)?.with_arithmetic(self.arithmetic);
+        let engine = Arc::new(engine);
         engines.insert(key, engine.clone());
         Ok(engine)
     }
@@ -112,15 +124,14 @@ impl Sampler {
         settings: &str,
         layout: &str,
         dtype: &str,
-        engine: &str,
-        threads: Option<usize>,
+        engine: Request,
     ) -> PyResult<Sampler> {
         let layouts =
             [("rows", Layout::Rows), ("padded-rows", Layout::PaddedRows), ("planes", Layout::Planes)];
         let layout = choice("layout", layout, &layouts)?;
         let dtype = choice("dtype", dtype, &[("float32", Dtype::F32), ("float16", Dtype::F16)])?;
         let settings: RecipeSettings = serde_json::from_str(settings).map_err(value)?;
-        let request = EngineRequest::new(engine, threads)?;
+        let request = EngineRequest::new(engine)?;
         let Model { model, name } = model.get();
         let builder = settings.builder(model).layout(layout).spectra_dtype(dtype);
         let recipe = py.detach(|| builder.build()).map_err(Error::from)?;
@@ -148,18 +159,28 @@ impl Sampler {
         let formats = self.recipe.formats().into_iter();
         formats
             .map(|ArrayFormat { quantity, dtype, width, .. }| {
-                (quantity.name(), dtype.name(), width, quantity.axis(), quantity.channels().to_vec())
+                (quantity.name(), dtype.name(), width, quantity.axis(), self.recipe.channels(quantity))
             })
             .collect()
     }
 
     /// The draws of a recipe as a WGSL module.
-    fn wgsl(&self, prefix: &str) -> PyResult<String> {
-        Ok(self.recipe.wgsl(prefix).map_err(Error::from)?)
+    fn wgsl(&self, prefix: &str, arithmetic: &str) -> PyResult<String> {
+        let forms = [("plain", Arithmetic::Plain), ("exact", Arithmetic::Exact)];
+        let arithmetic = choice("arithmetic", arithmetic, &forms)?;
+        let options = ModuleOptions { arithmetic, ..ModuleOptions::default() };
+        Ok(self.recipe.wgsl_with(prefix, options).map_err(Error::from)?)
     }
 
-    /// Draws a range of a source, a seed and the name of a stream, into the bytes of an array for each format. Returns the numbers of draws, of candidates, and of
-    /// draws that scaling took to 1 or above.
+    /// The content of the buffer that the module declares; empty where it declares none.
+    fn tables<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        let tables = self.recipe.tables();
+        let is_declared = tables.len() > ModuleOptions::MOST_CONSTANT_BYTES;
+        PyBytes::new(py, if is_declared { &tables } else { &[] })
+    }
+
+    /// Draws a range of a source, a seed and the name of a stream, into the bytes of an array for each format. Returns the
+    /// numbers of draws, of candidates, and of draws that scaling took to 1 or above.
     fn fill(
         &self,
         py: Python<'_>,

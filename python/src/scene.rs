@@ -9,7 +9,7 @@ use spectroll::scene::{Array, PRESETS, Scene as Described};
 use spectroll::suggestion::closest;
 
 use crate::error::{Error, Result, check_signals, os, value};
-use crate::sampler::EngineRequest;
+use crate::sampler::{EngineRequest, Request};
 
 /// A scene file that was read, and the engine that is to draw it.
 #[pyclass(frozen, module = "spectroll._spectroll")]
@@ -28,14 +28,8 @@ type Drawn<'py> = (String, Vec<usize>, &'static str, Bound<'py, PyArray1<u8>>, b
 impl Scene {
     /// The scene of a file, or of an example.
     #[new]
-    fn new(
-        py: Python<'_>,
-        name: PathBuf,
-        seed: Option<u64>,
-        engine: &str,
-        threads: Option<usize>,
-    ) -> PyResult<Scene> {
-        let request = EngineRequest::new(engine, threads)?;
+    fn new(py: Python<'_>, name: PathBuf, seed: Option<u64>, engine: Request) -> PyResult<Scene> {
+        let request = EngineRequest::new(engine)?;
         Ok(py.detach(|| open(name, seed, request))?)
     }
 

@@ -1,5 +1,7 @@
 """Draws: the bytes of the program's, whatever the quantity, layout and engine, of ranges and of lists of indices."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -196,6 +198,77 @@ def test_an_illuminant_may_be_given_as_powers():
     np.testing.assert_allclose(flat, equal, rtol=1e-6)
 
 
+def test_responses_are_sums_with_the_sensors(tmp_path):
+    grid = np.arange(400, 701, 10)
+    functions = {"R": np.exp(-((grid - 600) / 40) ** 2), "G": np.exp(-((grid - 540) / 40) ** 2)}
+    path = tmp_path / "camera.csv"
+    rows = [f"{nm},{r!r},{g!r}" for nm, r, g in zip(grid.tolist(), functions["R"].tolist(), functions["G"].tolist())]
+    path.write_text("\n".join(["nm,R,G", *rows]))
+    powers = np.linspace(1, 2, 31)
+    for sensors in (path, str(path), functions):
+        sampler = Sampler(sensors=sensors, illuminant=powers, engine="cpu")
+        drawn = sampler.draw(500, quantities=["spectra", "responses"])
+        weights = powers * np.array(list(functions.values()))
+        expected = drawn["spectra"].astype(float) @ (weights / weights.sum(1, keepdims=True)).T
+        np.testing.assert_allclose(drawn["responses"], expected, atol=5e-7)
+    lights = Sampler("granada", sensors="ss2", engine="cpu")
+    assert lights.draw(9, quantities="responses").shape == (9, 3)
+    aimed = Sampler(target=("ss2", "L", (0.2, 0.6)), sensors="ss2", illuminant="5600K", engine="cpu")
+    assert "5600K" in repr(aimed) and "'L'" in repr(aimed)
+    found = aimed.draw(500, quantities="responses")[:, 0]
+    assert 0.2 <= found.min() and found.max() <= 0.6 + 1e-6
+    labels = aimed.to_xarray(5, quantities=["responses"])["sensor"]
+    assert labels.values.tolist() == ["L", "M", "S"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"sensors": "ss3"}, 'did you mean "ss2"'),
+        ({"sensors": 3}, "it is the name of a set, a file, or a mapping"),
+        ({"target": "L"}, "it is three things"),
+        ({"target": ("ss2", "K", 0.3)}, "has no channel"),
+        ({"target": ("ss2", "L", 3.0)}, "did you mean 0.03"),
+        ({"illuminant": "3000K"}, "from 4000 to 25000"),
+        ({"observer": "cie1932"}, "did you mean 'cie1931'"),
+    ],
+)
+def test_what_no_sensor_is_says_why(settings, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        Sampler(engine="cpu", **settings)
+
+
+@pytest.mark.parametrize("engine", ["cpu", "gpu"])
+def test_metamers_have_their_colours(engine, program, tmp_path):
+    sampler = Sampler(spectroll.Model("munsell-vrhel"), engine=engine)
+    colours = np.array([[0.30, 0.30, 0.25], [0.20, 0.25, 0.10]])
+    spectra = sampler.given(colours, each=20, seed=2)
+    assert spectra.shape == (2, 20, 31) and 0 < spectra.min() and spectra.max() < 1
+    seen = Sampler(engine="cpu", illuminant="D65").draw(1, quantities=["spectra", "xyz"])  # the same weights
+    assert seen["xyz"].shape == (1, 3)
+    (tmp_path / "c.csv").write_text("\n".join(",".join(map(str, colour)) for colour in colours))
+    program("metamers", "c.csv", "-k", 6, "--per-colour", 20, "--seed", 2, "--engine", "cpu", "-o", "c.npz")
+    assert (np.load(tmp_path / "c.npz")["spectra"] == spectra).all()
+    np.testing.assert_array_equal(sampler.given(colours[1:])[0].shape, (31,))
+    details = sampler.given([[1, 1, 1], [0.3, 0.3, 0.25]], nearest=True, details=True)
+    assert details["status"].tolist() == [3, 1] and 0 < details["distance"][0] < 0.05
+    mode = sampler.given(colours, each=0)
+    assert mode.shape == (2, 31) and (mode == sampler.given(colours, each=0, seed=9)).all()
+    cones = Sampler(sensors="ss2", engine=engine).given([[0.3, 0.3, 0.2]], space="responses")
+    assert cones.shape == (1, 31)
+    for settings, message in [
+        ({"space": "rgb"}, "space='rgb'"),
+        ({"space": "responses"}, "needs a sampler with sensors"),
+        ({"hard": "eror"}, "did you mean 'error'"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            sampler.given(colours, **settings)
+    with pytest.raises(ValueError, match="the last axis has 3 values"):
+        sampler.given([[1, 2]])
+    with pytest.raises(ValueError, match="no spectrum of this model has"):
+        sampler.given([[1, 1, 1]], hard="error")
+
+
 def test_threads_of_python_draw_at_the_same_time():
     from concurrent.futures import ThreadPoolExecutor
 
@@ -212,3 +285,27 @@ def test_the_module_says_what_it_has():
     assert all(getattr(spectroll, name) is not None for name in spectroll.__all__)
     with pytest.raises(AttributeError, match="no attribute 'Smpler'"):
         spectroll.Smpler  # noqa: B018
+
+
+# Arithmetic
+
+
+def test_every_arithmetic_of_an_adapter_has_the_bytes_of_the_cpu():
+    expected = Sampler(lrv=0.4, bounds="scaled", engine="cpu").draw(5000, seed=3)
+    for arithmetic in ("auto", "exact"):
+        sampler = Sampler(lrv=0.4, bounds="scaled", engine="gpu", arithmetic=arithmetic)
+        assert sampler.draw(5000, seed=3).tobytes() == expected.tobytes(), arithmetic
+        assert pickle.loads(pickle.dumps(sampler)) == sampler
+    assert "arithmetic='exact'" in repr(sampler)
+    with pytest.raises(ValueError, match="arithmetic='fast'"):
+        Sampler(arithmetic="fast")
+
+
+def test_shader_text_comes_in_both_forms_with_its_tables():
+    plain = Sampler()
+    assert "fn wall_draw(seed: vec2<u32>, index: vec2<u32>) -> wall_Draw" in plain.wgsl("wall")
+    assert "index: vec2<u32>, zero: u32) -> wall_Draw" in plain.wgsl("wall", arithmetic="exact")
+    assert plain.wgsl_tables() == b""
+    covered = Sampler(lrv=0.99, bounds="scaled")
+    assert "var<storage, read> draw_tables" in covered.wgsl()
+    assert len(covered.wgsl_tables()) > 4 * 2047 and len(covered.wgsl_tables()) % 4 == 0

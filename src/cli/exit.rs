@@ -6,7 +6,8 @@ use spectroll::export::{ExportError, SelectionError};
 use spectroll::output::OutputError;
 use spectroll::scene::SceneError;
 use spectroll::{
-    DatasetError, EngineError, FitError, ModelError, Quantity, RecipeError, Remedy, Unphysical, WgslError,
+    DatasetError, EngineError, FitError, MetamerError, ModelError, Quantity, RecipeError, Remedy,
+    SensorError, Unphysical, WgslError,
 };
 
 use super::interrupt::{self, Interrupted};
@@ -40,6 +41,7 @@ pub(super) fn code(error: &anyhow::Error) -> u8 {
         || error.is::<Unphysical>()
         || error.is::<FitError>()
         || error.is::<ModelError>()
+        || error.is::<SensorError>()
     {
         4
     } else if error.is::<Unverified>() {
@@ -86,6 +88,7 @@ fn of_export(error: &ExportError) -> u8 {
         ExportError::Engine(error) => of_engine(error),
         ExportError::Output(error) => of_output(error),
         ExportError::Interrupted => interrupt::EXIT_CODE,
+        ExportError::Metamers(_) => 2,
         ExportError::Unfinished { cause, .. } => of_export(cause),
         _ => 1,
     }
@@ -122,6 +125,11 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
             OutputError::NotBuilt { .. } => " (cargo build --features)",
             _ => "",
         };
+    }
+    match error.downcast_ref() {
+        Some(ExportError::Metamers(MetamerError::Hard { .. })) => return " (--max-attempts, --hard mode)",
+        Some(ExportError::Metamers(_)) => return " (--hard skip, --nearest)",
+        _ => {}
     }
     if let Some(ExportError::Stdout(source)) = error.downcast_ref() {
         return of_value(source);
@@ -198,7 +206,19 @@ fn of_value(error: &io::Error) -> &'static str {
 fn of_recipe(error: &RecipeError) -> &'static str {
     match error {
         RecipeError::Pointless { setting: "an illuminant for reflectances", .. } => {
-            ": --illuminant needs --quantities xyz or linear_srgb"
+            ": --illuminant needs --quantities xyz, linear_srgb, lrv or responses"
+        }
+        RecipeError::Pointless { setting: "an observer", .. } => {
+            ": --observer needs --lrv, or --quantities xyz, linear_srgb or lrv"
+        }
+        RecipeError::Pointless { setting: "a set of sensors", .. } => {
+            ": --sensors needs --quantities responses"
+        }
+        RecipeError::Pointless { setting: "a scale of responses", .. } => {
+            ": --response-scale needs --quantities responses"
+        }
+        RecipeError::Pointless { setting: "a scale of responses relative to white", .. } => {
+            " (--response-scale absolute)"
         }
         RecipeError::Pointless { setting: "a scale of tristimulus values", .. } => {
             ": --xyz-scale needs --quantities xyz or linear_srgb"
@@ -207,6 +227,19 @@ fn of_recipe(error: &RecipeError) -> &'static str {
         RecipeError::Quantity { quantity: Quantity::Intensity, .. } => {
             ": --quantities intensity needs --intensity"
         }
+        RecipeError::Quantity { quantity: Quantity::Responses, .. } => {
+            ": --quantities responses needs --sensors"
+        }
+        RecipeError::Response { .. }
+        | RecipeError::ResponseOfIlluminant { .. }
+        | RecipeError::UnreachableResponse { .. }
+        | RecipeError::ResponseRange { .. } => " (--target)",
+        RecipeError::Sensors(error) if matches!(**error, SensorError::White { .. }) => {
+            " (--response-scale absolute)"
+        }
+        RecipeError::TooFewToGive { .. } => " (-k)",
+        RecipeError::Sensors(_) => " (--sensors, --target)",
+        RecipeError::Illuminant(_) => " (--illuminant)",
         RecipeError::Quantity { .. } | RecipeError::Nothing => " (--quantities)",
         RecipeError::Lrv(_) | RecipeError::LrvOfIlluminant | RecipeError::UnreachableLrv { .. } => " (--lrv)",
         RecipeError::Intensity(_)

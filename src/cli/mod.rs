@@ -16,9 +16,11 @@ mod adapters;
 mod bench;
 mod exit;
 mod fit;
+mod image;
 mod inspect;
 mod interrupt;
 mod look;
+mod metamers;
 mod models;
 mod options;
 mod packaging;
@@ -68,6 +70,7 @@ Examples:
   spectroll sample munsell-vrhel -n 1000000 -o reflectances.zarr --zstd
   spectroll verify reflectances.zarr
   spectroll scene --example condition3 --scenes 0..10 -o scenes.npz --preview scenes.png
+  spectroll sample munsell-vrhel -n 10000 --sensors ss2 --quantities spectra,responses -o cones.npz
   spectroll look mine.csv -o mine.png
   spectroll fit munsell vrhel --wavelengths 400:5:700 -k 8 -o surfaces.json
   spectroll shader granada --quantities linear_srgb --prefix sun > sun.wgsl
@@ -83,6 +86,7 @@ enum Command {
     Look(look::Arguments),
     Sample(sample::Arguments),
     Scene(scene::Arguments),
+    Metamers(metamers::Arguments),
     Verify(verify::VerifyArguments),
     Merge(verify::MergeArguments),
     Inspect(inspect::Arguments),
@@ -135,6 +139,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Look(arguments) => look::run(arguments),
         Command::Sample(arguments) => sample::run(arguments),
         Command::Scene(arguments) => scene::run(arguments),
+        Command::Metamers(arguments) => metamers::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),
         Command::Merge(arguments) => verify::join(arguments),
         Command::Inspect(arguments) => inspect::run(arguments),

@@ -21,6 +21,7 @@ fn program(lrv: Option<f64>, covariance_scale: f64) -> Program {
     let weights = lrv_weights(SURFACES.grid()).unwrap();
     let target = lrv.map(|lrv| LrvTarget { lrv: LrvLaw::Fixed(lrv), weights, bounds: Bounds::Scaled });
     Program {
+        given: 0,
         target,
         max_attempts: 1000,
         ..Program::new(&SURFACES, &program::weights(&SURFACES, covariance_scale))
@@ -377,6 +378,7 @@ fn what_pays_is_what_costs_less() {
 #[test]
 fn intervals_and_free_axes_are_covered() {
     let one = |gain: Vec<Vec<f64>>| Program {
+        given: 0,
         spectrum: Affine { offset: vec![0.5; 3], gain },
         ..Program::new(&SURFACES, &program::weights(&SURFACES, 1.0))
     };

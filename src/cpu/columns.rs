@@ -28,6 +28,7 @@ struct Column<'a> {
 /// Makes draws in f32, in order, on the threads of the pool in which this is called. Each array has the words of one
 /// output, and is as long as [`ArrayFormat::bytes`] says. Padding is left as it is.
 pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]) {
+    assert_eq!(draws.given.len(), kernel.given * draws.count() as usize, "responses for each draw");
     let count = draws.count() as usize;
     let size = (count / (4 * rayon::current_num_threads())).clamp(8 * LANES, CHUNK).next_multiple_of(4);
     let chunks = chunks(kernel, (count, size), arrays);
@@ -39,6 +40,7 @@ pub(crate) fn fill(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]
 
 /// Makes draws as [`fill`] does, on this thread alone.
 pub(crate) fn fill_here(kernel: &Kernel<f32>, draws: Draws, arrays: &mut [&mut [u32]]) {
+    assert_eq!(draws.given.len(), kernel.given * draws.count() as usize, "responses for each draw");
     let count = draws.count() as usize;
     let size = count.next_multiple_of(4).max(4);
     chunks(kernel, (count, size), arrays).into_iter().for_each(|columns| fill_chunk(kernel, draws, columns));

@@ -2,6 +2,7 @@
 
 use super::Verdicts;
 use crate::draw_status::DrawStatus;
+use crate::random::real::Real;
 use crate::random::stream::{Attempts, Draws};
 
 /// A draw that is done, and the lane of the candidates that it is in. Where it failed they are those of its last
@@ -52,6 +53,17 @@ impl<'a, const L: usize> Lanes<'a, L> {
     #[inline(always)]
     pub(super) fn are_busy(&self) -> bool {
         self.busy != 0
+    }
+
+    /// Puts the responses that each lane's draw is given into `inputs`, as many as these.
+    #[inline(always)]
+    pub(super) fn give<R: Real>(&self, inputs: &mut [[R; L]]) {
+        for l in 0..L {
+            let given = self.draws.given(self.numbers[l], inputs.len());
+            for (input, given) in inputs.iter_mut().zip(given) {
+                input[l] = R::from_f64(f64::from(*given));
+            }
+        }
     }
 
     /// Source of the words of the next candidates.

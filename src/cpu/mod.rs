@@ -46,6 +46,8 @@ pub(crate) struct Kernel<R> {
     max_attempts: u32,
     /// Range of values that spectra may take.
     range: ValueRange,
+    /// Number of responses that each draw is given, which come before its normals.
+    given: usize,
     outputs: Vec<Output<R>>,
 }
 
@@ -81,6 +83,7 @@ enum Unit<R> {
 
 /// The candidates that are being made, a lane each.
 struct Candidates<R, const L: usize> {
+    /// Standard normals, after the responses that are given.
     normals: Vec<[R; L]>,
     /// The spectrum before it is multiplied by the scale.
     spectrum: Vec<[R; L]>,
@@ -154,6 +157,7 @@ impl<R: Real> Kernel<R> {
             may_exceed_one: program.may_exceed_one(),
             max_attempts: program.max_attempts,
             range: program.value_range(),
+            given: program.given,
             outputs: program.outputs.iter().map(output).collect(),
         }
     }
@@ -166,6 +170,12 @@ impl<R: Real> Kernel<R> {
 
     /// Draw `index` of a stream: the values of each output, zeros where it failed. The status has none.
     pub(crate) fn draw(&self, stream: Stream, index: u64) -> (Vec<Vec<R>>, DrawStatus) {
+        self.draw_given(stream, index, &[])
+    }
+
+    /// Draw `index` of a stream, given these responses.
+    pub(crate) fn draw_given(&self, stream: Stream, index: u64, given: &[f32]) -> (Vec<Vec<R>>, DrawStatus) {
+        assert_eq!(given.len(), self.given, "responses are given to each draw");
         struct Only<'a, R>(&'a Kernel<R>, Option<(Vec<Vec<R>>, DrawStatus)>);
         impl<R: Real> Take<R, 1> for Only<'_, R> {
             fn take(&mut self, done: &[Done], candidates: &Candidates<R, 1>) {
@@ -173,7 +183,8 @@ impl<R: Real> Kernel<R> {
             }
         }
         let mut only = Only(self, None);
-        self.in_lanes(DrawRange { stream, first: index, count: 1 }.into(), &mut only);
+        let draws = Draws::from(DrawRange { stream, first: index, count: 1 });
+        self.in_lanes(draws.with_given(given), &mut only);
         only.1.expect("one draw was asked for")
     }
 
@@ -215,6 +226,7 @@ impl<R: Real> Kernel<R> {
         let mut candidates = self.candidates::<L>();
         let mut lanes = Lanes::new(draws);
         while lanes.are_busy() {
+            lanes.give(&mut candidates.normals[..self.given]);
             let words = lanes.words();
             let kept = self.propose(&mut candidates, words);
             let word = if self.reads_draw_block {
@@ -234,7 +246,10 @@ impl<R: Real> Kernel<R> {
         });
         let maps = maps.map(|fours| Mapped { values: vec![[R::ZERO; L]; 4 * fours], unit: [R::ONE; L] });
         Candidates {
-            normals: vec![[R::ZERO; L]; self.spectrum.components.next_multiple_of(2)],
+            normals: vec![
+                [R::ZERO; L];
+                self.given + (self.spectrum.components - self.given).next_multiple_of(2)
+            ],
             spectrum: vec![[R::ZERO; L]; 4 * self.spectrum.offset.len()],
             scale: [R::ONE; L],
             target_lrv: [R::ZERO; L],
@@ -248,7 +263,7 @@ impl<R: Real> Kernel<R> {
         match &self.proposal {
             Some(proposal) => proposal.propose(&mut candidates.normals, from),
             None => {
-                make_normals(&mut candidates.normals, from);
+                make_normals(&mut candidates.normals[self.given..], from);
                 [true; L]
             }
         }

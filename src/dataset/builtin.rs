@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use super::arrays::{self, Array};
 use super::reading::ReadOptions;
-use super::{SpectrumKind, Table, mat};
+use super::{SpectrumKind, Table, mat, text};
 use crate::grid::Grid;
 
 /// Name of a table that is compiled in.
@@ -37,6 +37,22 @@ pub enum BuiltinTable {
     D65,
     /// CIE 1931 colour matching functions x, y, z: 360 to 830 nm by 1 nm.
     Xyz1931,
+    /// CIE 1964 colour matching functions x, y, z of the 10 degree observer: 360 to 830 nm by 1 nm.
+    Xyz1964,
+    /// Cone fundamentals L, M, S of Stockman & Sharpe (2000) for fields of 2 degrees: 390 to 830 nm by 1 nm.
+    ConesSs2,
+    /// Cone fundamentals L, M, S of Stockman & Sharpe (2000) for fields of 10 degrees: 390 to 830 nm by 1 nm.
+    ConesSs10,
+    /// Cone fundamentals L, M, S of Smith & Pokorny (1975): 380 to 780 nm by 5 nm.
+    ConesSmithPokorny,
+    /// CIE scotopic luminous efficiency, that of the rods: 380 to 780 nm by 5 nm.
+    Rods,
+    /// Melanopsin at the human cornea, of Lucas et al. (2014): 390 to 660 nm by 1 nm.
+    Melanopsin,
+    /// CIE illuminant C: relative power, 380 to 780 nm by 5 nm.
+    IlluminantC,
+    /// CIE illuminants F2, F7 and F11, fluorescent lamps: relative power, 380 to 780 nm by 5 nm.
+    IlluminantsF,
     /// CIE daylight basis: the mean and two components of Judd, MacAdam & Wyszecki (1964), 380 to 780 nm by 5 nm.
     CieDaylight,
 }
@@ -53,6 +69,14 @@ impl BuiltinTable {
         BuiltinTable::Houser,
         BuiltinTable::D65,
         BuiltinTable::Xyz1931,
+        BuiltinTable::Xyz1964,
+        BuiltinTable::ConesSs2,
+        BuiltinTable::ConesSs10,
+        BuiltinTable::ConesSmithPokorny,
+        BuiltinTable::Rods,
+        BuiltinTable::Melanopsin,
+        BuiltinTable::IlluminantC,
+        BuiltinTable::IlluminantsF,
         BuiltinTable::CieDaylight,
     ];
 
@@ -73,6 +97,14 @@ impl BuiltinTable {
             BuiltinTable::Houser => "houser",
             BuiltinTable::D65 => "d65",
             BuiltinTable::Xyz1931 => "xyz1931",
+            BuiltinTable::Xyz1964 => "xyz1964",
+            BuiltinTable::ConesSs2 => "cones-ss2",
+            BuiltinTable::ConesSs10 => "cones-ss10",
+            BuiltinTable::ConesSmithPokorny => "cones-smith-pokorny",
+            BuiltinTable::Rods => "rods",
+            BuiltinTable::Melanopsin => "melanopsin",
+            BuiltinTable::IlluminantC => "illuminant-c",
+            BuiltinTable::IlluminantsF => "illuminants-f",
             BuiltinTable::CieDaylight => "cie-daylight",
         }
     }
@@ -89,6 +121,14 @@ impl BuiltinTable {
             BuiltinTable::Houser => ("spd_houser", include_bytes!("../../data/spd_houser.mat")),
             BuiltinTable::D65 => ("spd_D65", include_bytes!("../../data/spd_D65.mat")),
             BuiltinTable::Xyz1931 => ("T_xyz1931", include_bytes!("../../data/T_xyz1931.mat")),
+            BuiltinTable::Xyz1964 => ("T_xyz1964", include_bytes!("../../data/T_xyz1964.mat")),
+            BuiltinTable::ConesSs2 => ("T_cones_ss2", include_bytes!("../../data/T_cones_ss2.mat")),
+            BuiltinTable::ConesSs10 => ("T_cones_ss10", include_bytes!("../../data/T_cones_ss10.mat")),
+            BuiltinTable::ConesSmithPokorny => ("T_cones_sp", include_bytes!("../../data/T_cones_sp.mat")),
+            BuiltinTable::Rods => ("T_rods", include_bytes!("../../data/T_rods.mat")),
+            BuiltinTable::Melanopsin => ("T_melanopsin", include_bytes!("../../data/T_melanopsin.mat")),
+            BuiltinTable::IlluminantC => ("spd_CIEC", include_bytes!("../../data/spd_CIEC.mat")),
+            BuiltinTable::IlluminantsF => return illuminants_f(self.name()),
             BuiltinTable::CieDaylight => ("B_cieday", include_bytes!("../../data/B_cieday.mat")),
         };
         let options = ReadOptions { array: Some(variable.to_owned()), ..ReadOptions::default() };
@@ -107,6 +147,17 @@ impl BuiltinTable {
         }
         table
     }
+}
+
+/// The fluorescent lamps.
+fn illuminants_f(name: &str) -> Table {
+    let bytes = include_bytes!("../../data/illuminants_f.csv");
+    let reading = text::read(Path::new(name), bytes, &ReadOptions::default());
+    let mut table = reading.expect("compiled-in tables are readable").table;
+    table.name = name.to_owned();
+    table.source = table.name.clone();
+    table.kind = Some(SpectrumKind::Illuminant);
+    table
 }
 
 /// The daylights, from the file that `scripts/granada.py` makes:
@@ -160,6 +211,14 @@ mod tests {
             ("houser", 401, 380.0, 780.0, 81, Some(SpectrumKind::Illuminant)),
             ("d65", 1, 380.0, 780.0, 81, Some(SpectrumKind::Illuminant)),
             ("xyz1931", 3, 360.0, 830.0, 471, None),
+            ("xyz1964", 3, 360.0, 830.0, 471, None),
+            ("cones-ss2", 3, 390.0, 830.0, 441, None),
+            ("cones-ss10", 3, 390.0, 830.0, 441, None),
+            ("cones-smith-pokorny", 3, 380.0, 780.0, 81, None),
+            ("rods", 1, 380.0, 780.0, 81, None),
+            ("melanopsin", 1, 390.0, 660.0, 271, None),
+            ("illuminant-c", 1, 380.0, 780.0, 81, Some(SpectrumKind::Illuminant)),
+            ("illuminants-f", 3, 380.0, 780.0, 81, Some(SpectrumKind::Illuminant)),
             ("cie-daylight", 3, 380.0, 780.0, 81, None),
         ] {
             let table = BuiltinTable::named(name).unwrap().table();
@@ -179,6 +238,10 @@ mod tests {
         };
         assert_eq!(at(BuiltinTable::D65, 0, 560.0), 100.0);
         assert_eq!(at(BuiltinTable::Xyz1931, 1, 555.0), 1.0);
+        assert_eq!(at(BuiltinTable::Xyz1964, 0, 600.0), 1.12399);
+        assert_eq!(at(BuiltinTable::Rods, 0, 510.0), 0.997);
+        assert_eq!(at(BuiltinTable::IlluminantC, 0, 560.0), 105.3);
+        assert_eq!([0, 1, 2].map(|lamp| at(BuiltinTable::IlluminantsF, lamp, 545.0)), [24.88, 29.52, 72.84]);
         assert_eq!(at(BuiltinTable::CieDaylight, 0, 560.0), 100.0);
     }
 

@@ -125,11 +125,21 @@ impl Dataset {
         grid: Grid,
         settings: impl Into<Resampling>,
     ) -> Result<Dataset, DatasetError> {
+        tables.iter().try_for_each(|table| judge::table(table, &grid))?;
+        Dataset::unjudged(tables, grid, settings)
+    }
+
+    /// Resamples and joins tables as [`Dataset::new`] does, without judging whether their values can be measurements:
+    /// for lamps, whose lines stand out, and for sensitivities, which are 0 where a sensor sees nothing.
+    pub(crate) fn unjudged(
+        tables: &[Table],
+        grid: Grid,
+        settings: impl Into<Resampling>,
+    ) -> Result<Dataset, DatasetError> {
         let settings = settings.into();
         if tables.is_empty() {
             return Err(DatasetError::NoSpectra { name: "an empty list of tables".to_owned() });
         }
-        tables.iter().try_for_each(|table| judge::table(table, &grid))?;
         let resampled = tables.iter().map(|table| resample(table, &grid, settings));
         let resampled = resampled.collect::<Result<Vec<_>, _>>()?;
         let count = resampled.iter().map(|of| of.numbers.len()).sum();

@@ -21,6 +21,8 @@ pub struct Table {
     /// One column per spectrum.
     pub(super) spectra: DMatrix<f64>,
     pub(super) kind: Option<SpectrumKind>,
+    /// Names of the spectra, where the file has any: one for each, which may be empty.
+    pub(super) names: Vec<String>,
 }
 
 impl Table {
@@ -63,7 +65,7 @@ impl Table {
                 });
             }
         }
-        Ok(Table { source: name.clone(), name, wavelengths, spectra, kind: None })
+        Ok(Table { source: name.clone(), name, wavelengths, spectra, kind: None, names: Vec::new() })
     }
 
     /// Makes a table of wavelengths in nm that may fall, which is noted, and that are checked to be such.
@@ -186,6 +188,12 @@ impl Table {
     /// illuminants.
     pub fn kind(&self) -> Option<SpectrumKind> {
         self.kind
+    }
+
+    /// Names of the spectra as the file has them, in the headings of its columns or the heads of its rows: one for each,
+    /// empty where a spectrum has none; an empty list where none has.
+    pub fn names(&self) -> &[String] {
+        &self.names
     }
 
     /// The wavelengths of the measurements, nm.

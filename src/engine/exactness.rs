@@ -31,7 +31,7 @@ const TRIAL_DRAWS: u64 = 65_536;
 const TRIAL_PRODUCTS: f64 = (1u64 << 28) as f64;
 
 /// Choice of the arithmetic in which a device draws.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum ArithmeticChoice {
@@ -137,6 +137,17 @@ fn trial_draws(recipe: &Recipe) -> u64 {
     ((TRIAL_PRODUCTS / products) as u64).clamp(4, TRIAL_DRAWS) / 4 * 4
 }
 
+/// Responses that the draws of a trial are given, where a recipe gives them any: about those of the model's mean spectrum,
+/// which have many spectra.
+fn trial_responses(recipe: &Recipe, count: u64) -> Vec<f32> {
+    if recipe.program().given == 0 {
+        return Vec::new();
+    }
+    let (_, responses) = recipe.free();
+    let shifted = |i: u64, mean: &f64| (mean * (1.0 + ((i % 64) as f64 - 32.0) / 1024.0)) as f32;
+    (0..count).flat_map(|i| responses.offset.iter().map(move |mean| shifted(i, mean))).collect()
+}
+
 /// Whether the draws of a pipeline are those of the CPU.
 fn trial(gpu: &Gpu, recipe: &Recipe, sampler: &Sampler, indexing: Indexing) -> Result<bool, EngineError> {
     let job = Job { recipe, per_step: 1 };
@@ -149,6 +160,8 @@ fn trial(gpu: &Gpu, recipe: &Recipe, sampler: &Sampler, indexing: Indexing) -> R
         Indexing::Range => stream.draws(0..count).into(),
         Indexing::List => stream.at(&indices),
     };
+    let given = trial_responses(recipe, count);
+    let draws = draws.with_given(&given);
     let mut is_exact = true;
     schedule.draw::<EngineError>(&[draws], count, &mut |batches| {
         is_exact = is_exact && reference.difference(&batches[0], draws).is_none();

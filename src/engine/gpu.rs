@@ -359,6 +359,7 @@ impl Slot {
         for (prepared, draws) in self.prepared.iter_mut().zip(&draws) {
             prepared.set_window(&gpu.queue, draws.range).expect("a window has no more steps than a slot");
             prepared.set_indices(&gpu.queue, *draws);
+            prepared.set_given(&gpu.queue, *draws);
             prepared.record_first(&mut encoder);
         }
         let draws = draws.iter().map(|draws| draws.range).collect();

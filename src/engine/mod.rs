@@ -233,6 +233,12 @@ impl DrawSummary {
         Ok(())
     }
 
+    /// Adds those of a batch of draws that succeeded.
+    fn count_answered(&mut self, statuses: &[DrawStatus]) {
+        let answered = statuses.iter().filter(|status| status.attempts() > 0);
+        self.count(&answered.copied().collect::<Vec<_>>());
+    }
+
     /// Adds draws that succeeded.
     pub(crate) fn count(&mut self, statuses: &[DrawStatus]) {
         self.draws += statuses.len() as u64;

@@ -156,6 +156,31 @@ impl<'a> Session<'a> {
         self.draw(stream.at(indices), sink)
     }
 
+    /// Makes draws that are given responses, n of them for each channel of the recipe's
+    /// [given sensors](crate::RecipeBuilder::given), draw by draw, and hands them to `sink` in order, window by window. A
+    /// draw for whose responses no candidate was accepted is no error: its status says so, and its quantities are 0.
+    /// Returns the summary of those that succeeded.
+    ///
+    /// # Panics
+    /// Where there are not n responses for each draw, or the recipe gives draws none.
+    pub fn draw_given<'d, E: From<EngineError>>(
+        &mut self,
+        draws: impl Into<Draws<'d>>,
+        given: &'d [f32],
+        mut sink: impl FnMut(Batch) -> Result<(), E>,
+    ) -> Result<DrawSummary, E> {
+        let draws = draws.into().with_given(given);
+        let (count, width) = (draws.count() as usize, self.recipe.program().given);
+        assert!(width > 0, "the recipe gives draws no responses");
+        assert_eq!(given.len(), width * count, "{width} responses for each of {count} draws");
+        let mut summary = DrawSummary::default();
+        self.schedule(&draws)?.draw(&[draws], draws.count(), |batches| {
+            summary.count_answered(batches[0].statuses());
+            sink(batches[0])
+        })?;
+        Ok(summary)
+    }
+
     /// Makes draws, of a range or of a list, and hands them to `sink` in order, window by window. The first error ends
     /// it.
     pub fn draw<'d, E: From<EngineError>>(
@@ -164,6 +189,7 @@ impl<'a> Session<'a> {
         mut sink: impl FnMut(Batch) -> Result<(), E>,
     ) -> Result<DrawSummary, E> {
         let draws = draws.into();
+        assert_eq!(self.recipe.program().given, 0, "draws that are given responses take draw_given");
         let mut summary = DrawSummary::default();
         let max_attempts = self.recipe.program().max_attempts;
         self.schedule(&draws)?.draw(&[draws], draws.count(), |batches| {

@@ -106,7 +106,7 @@ impl<'a> DrawExport<'a> {
 fn field(recipe: &Recipe, format: ArrayFormat) -> Field {
     let field = match format.quantity.axis() {
         Some(axis) => Field::vector(format.quantity.name(), axis, format.width, format.dtype)
-            .with_channels(format.quantity.channels()),
+            .with_channels(&recipe.channels(format.quantity)),
         None => Field::scalar(format.quantity.name(), format.dtype),
     };
     if format.quantity == Quantity::Spectra { field.within(recipe.value_range()) } else { field }

@@ -19,6 +19,7 @@
 //! ```
 
 mod draws;
+mod metamers;
 mod model;
 mod output;
 pub mod provenance;
@@ -30,6 +31,7 @@ use std::io;
 use std::ops::Range;
 
 pub use draws::{DrawExport, DrawRows};
+pub use metamers::{ColourShape, Colours, MetamerExport, MetamerRows};
 pub use output::{Destination, Output};
 pub use scenes::{ArraySelection, SceneExport, SceneRows, SelectionError, model_sums};
 pub use space::{Space, SpaceCheck};

@@ -125,7 +125,7 @@ impl Output {
     /// tell an LRV of 0.4 to three digits.
     pub(super) fn stored(&self, quantity: Quantity) -> Dtype {
         match (self.dtype, quantity) {
-            (Dtype::F16, Quantity::Spectra) => Dtype::F16,
+            (Dtype::F16, Quantity::Spectra | Quantity::ColorSignal) => Dtype::F16,
             (Dtype::F16, _) => Dtype::F32,
             (dtype, _) => dtype,
         }

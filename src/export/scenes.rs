@@ -285,9 +285,10 @@ fn description(array: &Array, output: &Output) -> SharedArray {
 /// The names of the dimensions of an entry of an array.
 fn axes(array: &Array) -> Vec<String> {
     let inner = array.quantity.axis();
+    let lights = array.under.iter().map(|lights| format!("{lights}_number"));
     // Not the name of the group alone: xarray takes a dimension of an array's name for its coordinates.
     let outer = (array.shape.len() > usize::from(inner.is_some())).then(|| format!("{}_number", array.group));
-    outer.into_iter().chain(inner.map(str::to_owned)).collect()
+    lights.chain(outer).chain(inner.map(str::to_owned)).collect()
 }
 
 fn field(array: &Array) -> Field {
@@ -295,7 +296,7 @@ fn field(array: &Array) -> Field {
     let field = match inner {
         Some(axis) => {
             let width = array.shape.last().copied().unwrap_or(1);
-            Field::vector(&array.name, axis, width, array.dtype()).with_channels(array.quantity.channels())
+            Field::vector(&array.name, axis, width, array.dtype()).with_channels(&array.channels)
         }
         None => Field::scalar(&array.name, array.dtype()),
     };
@@ -303,10 +304,8 @@ fn field(array: &Array) -> Field {
         Some(range) => field.within(range),
         None => field,
     };
-    match axes(array).first() {
-        Some(outer) if array.shape.len() > usize::from(inner.is_some()) => {
-            field.repeated(outer, array.shape[0])
-        }
-        _ => field,
-    }
+    // From the innermost axis of elements outwards.
+    let axes = axes(array);
+    let rows = axes.iter().zip(&array.shape).take(array.shape.len() - usize::from(inner.is_some()));
+    rows.rev().fold(field, |field, (axis, extent)| field.repeated(axis, *extent))
 }

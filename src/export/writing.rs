@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use super::{Companions, Destination, Output, Rows};
 use crate::engine::{Engine, EngineError};
+use crate::metamers::MetamerError;
 use crate::output::{
     FileWriter, IfExists, OutputError, PendingFile, Schema, SetStatus, SetWriter, Sidecar, SpdFolder,
     StreamWriter,
@@ -18,6 +19,9 @@ pub enum ExportError {
     /// The rows cannot be drawn.
     #[error(transparent)]
     Engine(#[from] EngineError),
+    /// A colour has no answer, and that is to be an error.
+    #[error(transparent)]
+    Metamers(MetamerError),
     /// The rows cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -41,6 +45,15 @@ pub enum ExportError {
         /// The folder that holds them.
         folder: PathBuf,
     },
+}
+
+impl From<MetamerError> for ExportError {
+    fn from(error: MetamerError) -> ExportError {
+        match error {
+            MetamerError::Engine(error) => ExportError::Engine(error),
+            other => ExportError::Metamers(other),
+        }
+    }
 }
 
 fn kept(done: Option<(u64, u64)>, folder: &PathBuf) -> String {

@@ -102,6 +102,18 @@ impl Model {
         family(name)?.0.at(name, grid)
     }
 
+    /// A built-in model of another number of components than 6: a fit of its data on `grid`, as
+    /// [`builtin_at`](Model::builtin_at) makes one.
+    ///
+    /// ```
+    /// let grid = spectroll::Grid::DEFAULT;
+    /// assert_eq!(spectroll::Model::builtin_with("munsell-vrhel", grid, 8)?.components(), 8);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn builtin_with(name: &str, grid: Grid, components: usize) -> Result<Model, ModelError> {
+        family(name)?.0.fit(name, grid, Some(components))
+    }
+
     /// The data that a built-in model is fitted to.
     pub fn builtin_data(name: &str) -> Result<BuiltinData, ModelError> {
         let (family, _) = family(name)?;
@@ -133,6 +145,10 @@ impl Family {
         if let Some((_, text)) = self.fitted.iter().find(|(fitted, _)| fitted.parse().as_ref() == Ok(&grid)) {
             return Model::from_json(name, text);
         }
+        self.fit(name, grid, None)
+    }
+
+    fn fit(&self, name: &str, grid: Grid, components: Option<usize>) -> Result<Model, ModelError> {
         let tables = self.tables();
         let BuiltinData { first, last, .. } = self.data(&tables);
         let name = || name.to_owned();
@@ -143,7 +159,8 @@ impl Family {
             last,
             grid: grid.clone(),
         })?;
-        let fit = Fit::new(self.kind).fit(&data);
+        let fit = Fit::new(self.kind);
+        let fit = components.map_or(fit, |components| fit.components(components)).fit(&data);
         fit.map_err(|source| ModelError::BuiltinFit { name: name(), grid, source: Box::new(source) })
     }
 

@@ -55,7 +55,7 @@ impl<W: Write> Encoder for Csv<W> {
 fn names(field: &Field, wavelengths: &[f64]) -> Vec<String> {
     if let Some((_, count)) = &field.outer {
         let one =
-            Field { name: field.name.clone(), outer: None, width: field.width / count, ..field.clone() };
+            Field { outer: field.middle.clone(), middle: None, width: field.width / count, ..field.clone() };
         let inner = names(&one, wavelengths);
         let heading = |i, inner: &String| match field.axis {
             Some(_) => {

@@ -31,6 +31,10 @@ pub struct Field {
     /// Name and extent of the axis of rows within a draw, where it has several, such as the surfaces of a scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outer: Option<(String, usize)>,
+    /// Name and extent of a second such axis, between that and the values, such as the surfaces under each of a scene's
+    /// lights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub middle: Option<(String, usize)>,
     /// Names of the values along `axis`, where each has one of its own, such as X, Y and Z.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub channels: Vec<String>,
@@ -59,6 +63,7 @@ impl Field {
             name,
             axis: None,
             outer: None,
+            middle: None,
             channels: Vec::new(),
             width: 1,
             dtype,
@@ -67,9 +72,11 @@ impl Field {
         }
     }
 
-    /// Returns the field with `count` rows per draw, along the axis `outer`.
+    /// Returns the field with `count` rows per draw, along the axis `outer`; along a second one outside of the first, where
+    /// it has rows already.
     pub fn repeated(self, outer: &str, count: usize) -> Field {
-        Field { width: self.width * count, outer: Some((outer.to_owned(), count)), ..self }
+        let middle = self.outer.or(self.middle);
+        Field { width: self.width * count, outer: Some((outer.to_owned(), count)), middle, ..self }
     }
 
     /// Returns the field written as the type `stored`, if its values are floats.
@@ -81,8 +88,8 @@ impl Field {
     }
 
     /// Returns the field with a name for each value along its axis.
-    pub fn with_channels(self, names: &[&str]) -> Field {
-        Field { channels: names.iter().map(|name| (*name).to_owned()).collect(), ..self }
+    pub fn with_channels(self, names: &[impl AsRef<str>]) -> Field {
+        Field { channels: names.iter().map(|name| name.as_ref().to_owned()).collect(), ..self }
     }
 
     /// Returns the field with values in a range.
@@ -102,14 +109,14 @@ impl Field {
 
     /// Shape of the array of `rows` draws.
     pub fn shape(&self, rows: u64) -> Vec<u64> {
-        let outer = self.outer.as_ref().map(|(_, count)| *count);
-        let inner = self.axis.as_ref().map(|_| self.width / outer.unwrap_or(1).max(1));
-        std::iter::once(rows).chain(outer.into_iter().chain(inner).map(|n| n as u64)).collect()
+        let outer = self.outer.iter().chain(&self.middle).map(|(_, count)| *count);
+        let inner = self.axis.as_ref().map(|_| self.inner_width());
+        std::iter::once(rows).chain(outer.chain(inner).map(|n| n as u64)).collect()
     }
 
     /// Names of the dimensions, the first of which is `row`.
     pub fn axes<'a>(&'a self, row: &'a str) -> Vec<&'a str> {
-        let outer = self.outer.as_ref().map(|(name, _)| name.as_str());
+        let outer = self.outer.iter().chain(&self.middle).map(|(name, _)| name.as_str());
         std::iter::once(row).chain(outer).chain(self.axis.as_deref()).collect()
     }
 
@@ -146,7 +153,8 @@ impl Field {
 
     /// Number of values of each of a draw's rows: of a spectrum, its bands.
     fn inner_width(&self) -> usize {
-        self.width / self.outer.as_ref().map_or(1, |(_, count)| (*count).max(1))
+        let rows = self.outer.iter().chain(&self.middle).map(|(_, count)| (*count).max(1));
+        self.width / rows.product::<usize>()
     }
 
     /// Refuses values, of one spectrum say, of which even the largest is below the normal range of half precision. A
@@ -313,6 +321,9 @@ mod tests {
         let expected: Vec<u8> = values.iter().flat_map(|&v| f16::from_f32(v).to_le_bytes()).collect();
         assert_eq!(*half.store(&bytes).unwrap(), expected);
         assert_eq!(half.shape(5), [5, 2]);
+        let twice = Field::vector("y", "sensor", 3, Dtype::F32).repeated("surface", 4).repeated("light", 2);
+        assert_eq!((twice.shape(5), twice.width), (vec![5, 2, 4, 3], 24));
+        assert_eq!(twice.axes("scene"), ["scene", "light", "surface", "sensor"]);
         let attempts = Field::scalar("attempts", Dtype::U32).stored_as(Dtype::F16);
         assert_eq!((attempts.stored, attempts.shape(5)), (Dtype::U32, vec![5]));
     }

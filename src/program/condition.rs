@@ -1,37 +1,38 @@
-//! A model's Gaussian, given the tristimulus values of its spectra.
+//! A model's Gaussian, given the responses of some sensors to its spectra, such as their tristimulus values.
 //!
-//! Tristimulus values are linear in the standard normals of a draw: xyz = a + A z, where A has 3 rows. Given xyz, z is
-//! normal on an affine subspace: z = z0 + N y, where z0 = A^+ (xyz - a) is its shortest point, the columns of N are an
-//! orthonormal basis of the directions that leave xyz alone, and y are k - 3 standard normals. That is the conditional
-//! mean and covariance in closed form, in the frame where the covariance is 1; all else that is linear in z follows.
+//! Responses are linear in the standard normals of a draw: c = a + A z, where A has n rows. Given c, z is normal on an
+//! affine subspace: z = z0 + N y, where z0 = A^+ (c - a) is its shortest point, the columns of N are an orthonormal basis
+//! of the directions that leave c alone, and y are k - n standard normals. That is the conditional mean and covariance in
+//! closed form, in the frame where the covariance is 1; all else that is linear in z follows. Neither A^+ nor N depends on
+//! c: as a map of (c, y), one program serves draws that each have responses of their own.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::affine::Affine;
 
-/// Singular values below this part of the largest do not count: the tristimulus values do not vary freely.
+/// Singular values below this part of the largest do not count: the responses do not vary freely.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// Effect of given tristimulus values on the normals of a model.
+/// Effect of given responses on the normals of a model.
 #[derive(Clone, Debug)]
 pub(crate) struct Condition {
-    /// a, the tristimulus values at z = 0.
+    /// a, the responses at z = 0.
     at_zero: DVector<f64>,
-    /// A^+, k rows of 3.
+    /// A^+, k rows of n.
     inverse: DMatrix<f64>,
-    /// N, k rows of k - 3.
+    /// N, k rows of k - n.
     free: DMatrix<f64>,
 }
 
 impl Condition {
-    /// Of the map of the tristimulus values. `None` where they cannot be given freely, or where nothing is left to
-    /// draw: with 3 components or fewer, or a covariance that varies in fewer than 4 directions.
-    pub(crate) fn new(xyz: &Affine) -> Option<Condition> {
-        let k = xyz.gain.len();
-        if k < 4 {
+    /// Makes the condition of a map of n responses. `None` where they cannot be given freely, or where nothing is left to
+    /// draw: with n components or fewer, or a covariance that varies in no more than n directions.
+    pub(crate) fn new(responses: &Affine) -> Option<Condition> {
+        let (n, k) = (responses.offset.len(), responses.gain.len());
+        if k <= n {
             return None;
         }
-        let map = DMatrix::from_fn(3, k, |row, column| xyz.gain[column][row]);
+        let map = DMatrix::from_fn(n, k, |row, column| responses.gain[column][row]);
         // Values without vectors: with them nalgebra's are wrong where rows are nearly alike.
         let singular = map.singular_values();
         let largest = singular.max();
@@ -43,25 +44,41 @@ impl Condition {
         let (q, r) = (qr.q(), qr.r());
         let inverse = r.solve_upper_triangular(&q.transpose())?.transpose();
         Some(Condition {
-            at_zero: DVector::from_column_slice(&xyz.offset),
+            at_zero: DVector::from_column_slice(&responses.offset),
             inverse,
             free: complement(&q.transpose()),
         })
     }
 
-    /// A map of z as one of y, given these tristimulus values.
-    pub(crate) fn given(&self, xyz: [f64; 3], map: &Affine) -> Affine {
-        let origin = &self.inverse * (DVector::from_column_slice(&xyz) - &self.at_zero);
-        let mix = |by: &[f64]| {
-            let mut sum = vec![0.0; map.offset.len()];
-            for (gain, by) in map.gain.iter().zip(by) {
-                sum.iter_mut().zip(gain).for_each(|(sum, gain)| *sum += gain * by);
-            }
-            sum
-        };
-        let offset = map.offset.iter().zip(mix(origin.as_slice())).map(|(offset, by)| offset + by).collect();
-        Affine { offset, gain: self.free.column_iter().map(|column| mix(column.as_slice())).collect() }
+    /// A map of z as one of y, given these responses.
+    pub(crate) fn given(&self, responses: &[f64], map: &Affine) -> Affine {
+        let origin = &self.inverse * (DVector::from_column_slice(responses) - &self.at_zero);
+        let shift = mix(map, origin.as_slice());
+        let offset = map.offset.iter().zip(shift).map(|(offset, by)| offset + by).collect();
+        Affine { offset, gain: self.free(map) }
     }
+
+    /// A map of z as one of (c, y): of the responses that are given to a draw, and of the normals that are left.
+    pub(crate) fn open(&self, map: &Affine) -> Affine {
+        let shift = mix(map, (&self.inverse * -&self.at_zero).as_slice());
+        let offset = map.offset.iter().zip(shift).map(|(offset, by)| offset + by).collect();
+        let of_responses = self.inverse.column_iter().map(|column| mix(map, column.as_slice()));
+        Affine { offset, gain: of_responses.chain(self.free(map)).collect() }
+    }
+
+    /// Change of a map's values per unit of each of y.
+    fn free(&self, map: &Affine) -> Vec<Vec<f64>> {
+        self.free.column_iter().map(|column| mix(map, column.as_slice())).collect()
+    }
+}
+
+/// The sum of a map's gains, each times its part of `by`.
+fn mix(map: &Affine, by: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0; map.offset.len()];
+    for (gain, by) in map.gain.iter().zip(by) {
+        sum.iter_mut().zip(gain).for_each(|(sum, gain)| *sum += gain * by);
+    }
+    sum
 }
 
 /// Orthonormal columns that are orthogonal to the orthonormal `rows`: what is left of the unit vectors, the longest
@@ -100,7 +117,7 @@ mod tests {
     fn given_tristimulus_values_do_not_vary() {
         let (_, program, xyz) = surfaces();
         let target = [0.3, 0.4, 0.2];
-        let given = Condition::new(&xyz).unwrap().given(target, &xyz);
+        let given = Condition::new(&xyz).unwrap().given(&target, &xyz);
         assert!(given.offset.iter().zip(target).all(|(found, wanted)| (found - wanted).abs() < 1e-14));
         assert_eq!(given.gain.len(), program.components() - 3);
         assert!(given.gain.iter().flatten().all(|gain| gain.abs() < 1e-15));
@@ -112,7 +129,7 @@ mod tests {
         let (model, _, xyz) = surfaces();
         let target = [0.25, 0.3, 0.2];
         let map = weights(&model, 1.0);
-        let given = Condition::new(&xyz).unwrap().given(target, &map);
+        let given = Condition::new(&xyz).unwrap().given(&target, &map);
         let k = model.components();
         let factor = DMatrix::from_fn(k, k, |row, column| map.gain[column][row]);
         let a = DMatrix::from_fn(3, k, |row, column| xyz.gain[column][row]); // of z: a = A factor
@@ -124,6 +141,27 @@ mod tests {
         let gain = DMatrix::from_fn(k, k - 3, |row, column| given.gain[column][row]);
         assert!((DVector::from_column_slice(&given.offset) - mean).amax() < 1e-12);
         assert!((&gain * gain.transpose() - covariance).amax() < 1e-12);
+    }
+
+    /// One map of (c, y) is every map of y, whatever c.
+    #[test]
+    fn responses_of_each_draw_are_inputs_like_normals() {
+        let (_, program, xyz) = surfaces();
+        let condition = Condition::new(&xyz).unwrap();
+        let open = condition.open(&program.spectrum);
+        assert_eq!(open.gain.len(), program.components());
+        for target in [[0.25, 0.3, 0.2], [0.9, 0.9, 0.8]] {
+            let (each, own) = (open.at(&target), condition.given(&target, &program.spectrum));
+            assert!(each.offset.iter().zip(&own.offset).all(|(a, b)| (a - b).abs() < 1e-13));
+            assert_eq!(each.gain, own.gain);
+        }
+        // The responses themselves are the inputs.
+        let own = condition.open(&xyz);
+        assert!(own.offset.iter().all(|offset| offset.abs() < 1e-14));
+        for (input, gain) in own.gain.iter().enumerate() {
+            let expected = |row: usize| f64::from(u8::from(row == input));
+            assert!(gain.iter().enumerate().all(|(row, gain)| (gain - expected(row)).abs() < 1e-14));
+        }
     }
 
     #[test]

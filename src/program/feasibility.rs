@@ -83,11 +83,11 @@ pub(crate) fn largest_lrv(program: &Program, weights: &[f64]) -> Option<f64> {
     Some(problem.solve().ok()?.into_solution().ok()?.objective())
 }
 
-/// The tristimulus values nearest to `target` that a spectrum within the bounds has, by the largest of the differences
-/// in X, Y and Z. `xyz` is the map of the tristimulus values.
-pub(crate) fn nearest_xyz(program: &Program, xyz: &Affine, target: [f64; 3]) -> Option<[f64; 3]> {
+/// The responses nearest to `target` that a spectrum within the bounds has, by the largest of the differences in them.
+/// `responses` is their map.
+pub(crate) fn nearest(program: &Program, responses: &Affine, target: &[f64]) -> Option<Vec<f64>> {
     let mut problem = Problem::new(OptimizationDirection::Minimize);
-    let z: Vec<Variable> = xyz.gain.iter().map(|_| problem.add_var(0.0, (-REACH, REACH))).collect();
+    let z: Vec<Variable> = responses.gain.iter().map(|_| problem.add_var(0.0, (-REACH, REACH))).collect();
     let distance = problem.add_var(1.0, (0.0, f64::INFINITY));
     let terms = |coefficients: &[f64]| -> Vec<_> {
         z.iter().copied().zip(coefficients.iter().copied()).filter(|(_, c)| c.abs() > NEGLIGIBLE).collect()
@@ -95,8 +95,8 @@ pub(crate) fn nearest_xyz(program: &Program, xyz: &Affine, target: [f64; 3]) -> 
     for bound in half_spaces(program) {
         problem.add_constraint(terms(&bound.normal), ComparisonOp::Le, bound.room);
     }
-    for (axis, target) in target.into_iter().enumerate() {
-        let value = xyz.value(axis);
+    for (axis, target) in target.iter().enumerate() {
+        let value = responses.value(axis);
         let mut terms = terms(&value.gain.concat());
         let difference = target - value.offset[0];
         terms.push((distance, -1.0));
@@ -106,11 +106,11 @@ pub(crate) fn nearest_xyz(program: &Program, xyz: &Affine, target: [f64; 3]) -> 
     }
     let solution = problem.solve().ok()?.into_solution().ok()?;
     let z: Vec<f64> = z.iter().map(|&z| solution.var_value(z)).collect();
-    Some(
-        [0, 1, 2].map(|axis| {
-            xyz.offset[axis] + xyz.gain.iter().zip(&z).map(|(gain, z)| gain[axis] * z).sum::<f64>()
-        }),
-    )
+    let value = |axis: usize| {
+        let gains = responses.gain.iter().zip(&z);
+        responses.offset[axis] + gains.map(|(gain, z)| gain[axis] * z).sum::<f64>()
+    };
+    Some((0..target.len()).map(value).collect())
 }
 
 /// The bounds that a program's rule sets: those of the largest target, where each draw has its own.
@@ -178,6 +178,7 @@ mod tests {
             proposal: None,
             max_attempts: 1,
             outputs: Vec::new(),
+            given: 0,
         }
     }
 

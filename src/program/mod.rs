@@ -8,6 +8,7 @@
 
 pub(crate) mod condition;
 pub(crate) mod feasibility;
+pub(crate) mod mode;
 mod rule;
 
 pub use rule::Bounds;
@@ -66,6 +67,8 @@ pub(crate) struct Program {
     pub(crate) max_attempts: u32,
     /// Outputs, in the order of [`Quantity`](crate::Quantity), each once.
     pub(crate) outputs: Vec<Output>,
+    /// Number of components that are given to each draw, its responses, and come before those that are drawn.
+    pub(crate) given: usize,
 }
 
 impl Program {
@@ -84,12 +87,27 @@ impl Program {
             proposal: None,
             max_attempts: 1,
             outputs: Vec::new(),
+            given: 0,
         }
     }
 
     /// Returns the program with every spectrum multiplied by `intensity`.
     pub(crate) fn brightened(self, intensity: f64) -> Program {
         Program { spectrum: self.spectrum.scaled(intensity), ..self }
+    }
+
+    /// Returns the program of draws that are all given these responses.
+    pub(crate) fn at(&self, responses: &[f64]) -> Program {
+        let fixed = |source: &Source| match source {
+            Source::Map(map, Unit::Over(over)) => {
+                Source::Map(map.at(responses), Unit::Over(over.at(responses)))
+            }
+            Source::Map(map, unit) => Source::Map(map.at(responses), unit.clone()),
+            other => other.clone(),
+        };
+        let output = |output: &Output| Output { format: output.format, source: fixed(&output.source) };
+        let outputs = self.outputs.iter().map(output).collect();
+        Program { spectrum: self.spectrum.at(responses), outputs, given: 0, ..self.clone() }
     }
 
     /// Returns the program with candidates from a cover.
@@ -128,8 +146,14 @@ impl Program {
         self.spectrum.offset.len()
     }
 
+    /// Number of components, those that are given included.
     pub(crate) fn components(&self) -> usize {
         self.spectrum.gain.len()
+    }
+
+    /// Number of normals of a candidate.
+    pub(crate) fn normals(&self) -> usize {
+        self.components() - self.given
     }
 
     /// Whether spectra are scaled, by a target or an intensity.

@@ -119,7 +119,7 @@ impl Stream {
     /// The draws of a list of indices, in its order: any indices, any number of times.
     pub fn at(self, indices: &[u64]) -> Draws<'_> {
         let range = DrawRange { stream: self, first: 0, count: indices.len() as u64 };
-        Draws { range, indices: Some(indices) }
+        Draws { range, indices: Some(indices), given: &[] }
     }
 
     /// A sequential generator over the stream, for code that wants one of `rand`'s. Its words are not those of any
@@ -186,16 +186,18 @@ impl DrawRange {
 }
 
 /// Draws of a stream: those of a [`DrawRange`], or those of a list of indices ([`Stream::at`]).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draws<'a> {
     /// The range; where there is a list, its indices are places in the list.
     pub(crate) range: DrawRange,
     pub(crate) indices: Option<&'a [u64]>,
+    /// Responses that each draw is given, draw by draw; none of recipes without such.
+    pub(crate) given: &'a [f32],
 }
 
 impl From<DrawRange> for Draws<'_> {
     fn from(range: DrawRange) -> Self {
-        Draws { range, indices: None }
+        Draws { range, indices: None, given: &[] }
     }
 }
 
@@ -217,7 +219,25 @@ impl<'a> Draws<'a> {
 
     /// The part of the draws that starts `offset` in and has `count` of them.
     pub fn part(&self, offset: u64, count: u64) -> Draws<'a> {
-        Draws { range: self.range.part(offset, count), ..*self }
+        let width = self.given.len() / (self.count().max(1) as usize);
+        let end = |number: u64| (width * number as usize).min(self.given.len());
+        let given = &self.given[end(offset)..end(offset + count)];
+        Draws { range: self.range.part(offset, count), given, ..*self }
+    }
+
+    /// The draws with these responses, which are given to each of them.
+    pub(crate) fn with_given<'b>(self, given: &'b [f32]) -> Draws<'b>
+    where
+        'a: 'b,
+    {
+        Draws { given, ..self }
+    }
+
+    /// The responses that the draw of this number is given, `width` of them; those of the last beyond it.
+    #[inline(always)]
+    pub(crate) fn given(&self, number: u64, width: usize) -> &'a [f32] {
+        let number = number.min(self.range.count - 1) as usize;
+        &self.given[number * width..][..width]
     }
 }
 

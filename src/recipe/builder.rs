@@ -1,13 +1,13 @@
 //! Construction of recipes, and the checks that they can be drawn.
 
-use super::outputs::{OutputRequest, outputs};
+use super::outputs::{Aim, OutputRequest, outputs};
 use super::pilot::{TOLERABLE_FAILURE, failure, pilot, pilot_of_draws};
 use super::{
-    CoverSize, DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, Lrv, ProposalKind, Recipe, RecipeError,
-    RecipeSettings, XyzScale,
+    CoverSize, DEFAULT_MAX_ATTEMPTS, Intensity, Lrv, ProposalKind, Recipe, RecipeError, RecipeSettings,
+    ResponseTarget, XyzScale,
 };
 use crate::affine::Affine;
-use crate::colorimetry;
+use crate::colorimetry::{Illuminant, Observer};
 use crate::cover::Cover;
 use crate::cover::HalfSpace;
 use crate::dataset::SpectrumKind;
@@ -16,6 +16,7 @@ use crate::program::condition::Condition;
 use crate::program::feasibility::{self, Room};
 use crate::program::{self, Bounds, IntensityLaw, LrvLaw, LrvTarget, Program};
 use crate::quantity::{Dtype, Layout, Quantity};
+use crate::sensors::{ResponseScale, SensorError, Sensors};
 
 /// A recipe under construction.
 #[derive(Clone, Debug)]
@@ -23,6 +24,8 @@ pub struct RecipeBuilder {
     model: Model,
     lrv: Option<Lrv>,
     xyz: Option<[f64; 3]>,
+    target: Option<ResponseTarget>,
+    given: Option<Sensors>,
     bounds: Option<Bounds>,
     covariance_scale: f64,
     intensity: Option<Intensity>,
@@ -37,6 +40,8 @@ impl RecipeBuilder {
             model: model.clone(),
             lrv: None,
             xyz: None,
+            target: None,
+            given: None,
             bounds: None,
             covariance_scale: 1.0,
             intensity: None,
@@ -70,9 +75,41 @@ impl RecipeBuilder {
         self
     }
 
-    /// The illuminant under which reflectances have their XYZ, chromaticity and linear sRGB ([`Illuminant::D65`]).
+    /// Sets the illuminant under which reflectances have their responses, XYZ, chromaticity, linear sRGB and LRV, and
+    /// under which their targets are meant ([`Illuminant::D65`]).
     pub fn illuminant(mut self, illuminant: Illuminant) -> Self {
         self.outputs.illuminant = Some(illuminant);
+        self
+    }
+
+    /// Sets the observer of XYZ, chromaticity, linear sRGB and LRV, and of their targets ([`Observer::Cie1931`]).
+    pub fn observer(mut self, observer: Observer) -> Self {
+        self.outputs.observer = Some(observer);
+        self
+    }
+
+    /// Sets the sensors of [`Quantity::Responses`].
+    ///
+    /// ```
+    /// use spectroll::{Model, Quantity, Recipe, Sensors, Stream};
+    ///
+    /// let cones = Sensors::builtin("ss2").expect("it is built in");
+    /// let model = Model::builtin("munsell-vrhel")?;
+    /// let recipe = Recipe::builder(&model).sensors(cones).quantities([Quantity::Responses]).build()?;
+    /// let drawn = recipe.draw::<f32>(Stream::new(1), 0);
+    /// assert_eq!(recipe.channels(Quantity::Responses), ["L", "M", "S"]);
+    /// assert!(drawn.values(Quantity::Responses).iter().all(|&response| 0.0 < response && response < 1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn sensors(mut self, sensors: Sensors) -> Self {
+        self.outputs.sensors = Some(sensors);
+        self
+    }
+
+    /// Sets the scale of responses ([`ResponseScale::White`] of reflectances, [`ResponseScale::Absolute`] of illuminants,
+    /// which have no other).
+    pub fn response_scale(mut self, scale: ResponseScale) -> Self {
+        self.outputs.response_scale = Some(scale);
         self
     }
 
@@ -102,7 +139,24 @@ impl RecipeBuilder {
         RecipeBuilder { lrv: Some(lrv.into()), ..self }
     }
 
-    /// Gives every draw these tristimulus values under D65, where a perfect white has Y = 1: draws of the model's
+    /// Scales every draw to the response of a sensor, relative to a perfect white (above 0 and below 1), as
+    /// [`RecipeBuilder::lrv`] does to a luminous reflectance: to one for all, or to one of its own for each draw.
+    ///
+    /// ```
+    /// use spectroll::{Model, Quantity, Recipe, ResponseTarget, Sensors, Stream};
+    ///
+    /// let cones = Sensors::builtin("ss2").expect("it is built in");
+    /// let model = Model::builtin("munsell-vrhel")?;
+    /// let recipe = Recipe::builder(&model).target(ResponseTarget::new(cones.clone(), "L", 0.3)).sensors(cones);
+    /// let drawn = recipe.quantities([Quantity::Responses]).build()?.draw::<f32>(Stream::new(1), 0);
+    /// assert!((drawn.values(Quantity::Responses)[0] - 0.3).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn target(self, target: ResponseTarget) -> Self {
+        RecipeBuilder { target: Some(target), ..self }
+    }
+
+    /// Gives every draw these tristimulus values, of the recipe's observer and under its illuminant, where a perfect white has Y = 1: draws of the model's
     /// Gaussian conditioned on them, of k - 3 dimensions, with the spectrum between 0 and 1. They are met to the
     /// rounding of f32, within 1e-6.
     ///
@@ -117,6 +171,29 @@ impl RecipeBuilder {
     /// ```
     pub fn xyz(self, xyz: [f64; 3]) -> Self {
         RecipeBuilder { xyz: Some(xyz), ..self }
+    }
+
+    /// Gives every draw responses of its own: draws of the model's Gaussian conditioned on what these sensors saw, n values
+    /// for each draw, relative to a perfect white under the recipe's illuminant (of illuminants, absolute). The covariance
+    /// does not depend on them and the mean is linear in them, so one recipe serves draws of any responses:
+    /// [`Session::draw_given`](crate::Session::draw_given) takes them, and [`Metamers`](crate::Metamers) answers also those
+    /// that rejection hardly finds a spectrum for. They are met to the rounding of f32.
+    ///
+    /// A draw is a function of the model, the recipe, the seed, the stream, the index and its responses.
+    /// [`Recipe::acceptance`] is that of the responses to the model's mean.
+    ///
+    /// ```
+    /// use spectroll::{Model, Quantity, Recipe, Sensors, Stream};
+    ///
+    /// let eye = Sensors::builtin("cie1931").expect("it is built in");
+    /// let model = Model::builtin("munsell-vrhel")?;
+    /// let recipe = Recipe::builder(&model).given(eye.clone()).sensors(eye).quantities([Quantity::Responses]).build()?;
+    /// let drawn = recipe.draw_given::<f32>(Stream::new(1), 0, &[0.35, 0.3, 0.2]);
+    /// assert!((drawn.values(Quantity::Responses)[0] - 0.35).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn given(self, sensors: Sensors) -> Self {
+        RecipeBuilder { given: Some(sensors), ..self }
     }
 
     /// Sets the spectrum that must lie between 0 and 1 where there is a target LRV ([`Bounds::Base`]).
@@ -143,6 +220,9 @@ impl RecipeBuilder {
     /// a pilot run accepts enough candidates.
     pub fn build(self) -> Result<Recipe, RecipeError> {
         let program = self.program()?;
+        if program.given > 0 {
+            return self.given_its_own(program);
+        }
         let half_spaces = feasibility::half_spaces(&program);
         let centre = self.centre(&program, &half_spaces)?;
         if program.tests_own_targets() {
@@ -160,11 +240,16 @@ impl RecipeBuilder {
         RecipeSettings {
             lrv: self.lrv,
             xyz: self.xyz,
+            target: self.target.clone(),
+            given: self.given.clone(),
             bounds: self.bounds.unwrap_or_default(),
             covariance_scale: self.covariance_scale,
             intensity: self.intensity,
             quantities: self.outputs.quantities.clone(),
             illuminant: self.outputs.illuminant.clone().unwrap_or_default(),
+            observer: self.outputs.observer(),
+            sensors: self.outputs.sensors.clone(),
+            response_scale: self.outputs.response_scale,
             xyz_scale: self.outputs.xyz_scale.unwrap_or_default(),
             proposal: self.proposal,
             max_attempts: self.max_attempts,
@@ -179,21 +264,28 @@ impl RecipeBuilder {
         if self.max_attempts == 0 || self.max_attempts > i32::MAX as u32 {
             return Err(RecipeError::MaxAttempts(self.max_attempts));
         }
-        if self.bounds.is_some() && self.lrv.is_none() {
+        if self.bounds.is_some() && self.lrv.is_none() && self.target.is_none() {
             let (setting, needs) = ("a choice of bounds", "a target luminous reflectance");
             return Err(RecipeError::Pointless { setting, needs });
         }
-        let target = self.lrv.map(|lrv| self.target(lrv)).transpose()?;
+        let target = self.scaling()?;
         let mut weights = program::weights(&self.model, self.covariance_scale);
         if let Some(xyz) = self.xyz {
             if !(xyz.iter().all(|v| v.is_finite()) && xyz[1] > 0.0 && xyz[1] < 1.0) {
                 return Err(RecipeError::Xyz(xyz));
             }
-            weights = self.condition(&weights)?.given(xyz, &weights);
+            weights = self.condition(&weights)?.given(&xyz, &weights);
         }
-        let mut program = Program { max_attempts: self.max_attempts, ..Program::new(&self.model, &weights) };
+        let given = self.given.as_ref().map_or(0, Sensors::len);
+        if let Some(sensors) = &self.given {
+            let responses = self.responses(sensors, &weights)?;
+            let condition = Condition::new(&responses);
+            weights = condition.ok_or_else(|| self.too_few_directions(sensors))?.open(&weights);
+        }
+        let max_attempts = self.max_attempts;
+        let mut program = Program { max_attempts, given, ..Program::new(&self.model, &weights) };
         program.target = target.map(|target| target.of_unlike_bands(&program.spectrum));
-        let mut asked = self.outputs.clone();
+        let mut asked = OutputRequest { aim: self.aim(), ..self.outputs.clone() };
         if let Some(intensity) = self.intensity {
             program = self.brighten(program, intensity)?;
             asked.fixed = if let Intensity::Fixed(value) = intensity { Some(value) } else { None };
@@ -210,7 +302,12 @@ impl RecipeBuilder {
             let lrv = target.lrv.largest();
             let largest = feasibility::largest_lrv(program, &target.weights);
             if let Some(largest) = largest.filter(|&largest| lrv >= largest) {
-                return Err(RecipeError::UnreachableLrv { lrv, largest });
+                return Err(match &self.target {
+                    None => RecipeError::UnreachableLrv { lrv, largest },
+                    Some(target) => {
+                        RecipeError::UnreachableResponse { sensor: target.sensor(), response: lrv, largest }
+                    }
+                });
             }
         }
         match (feasibility::room(half_spaces), self.xyz) {
@@ -274,15 +371,18 @@ impl RecipeBuilder {
     /// The recipe of plain rejection where the target of each draw bounds its spectrum. A cover is of one region, and
     /// each target has its own, so what plain rejection cannot draw at the hardest target is refused.
     fn reject_by_own_targets(self, program: Program) -> Result<Recipe, RecipeError> {
-        let Some(Lrv::Uniform(low, high)) = self.lrv else {
-            unreachable!("the program has targets of draws")
-        };
+        let own = self.lrv.or(self.target.as_ref().map(|target| target.response));
+        let Some(Lrv::Uniform(low, high)) = own else { unreachable!("the program has targets of draws") };
+        let sensor = self.target.as_ref().map(ResponseTarget::sensor);
         if self.proposal == ProposalKind::Cover {
-            return Err(RecipeError::CoverOfLrvRange { low, high });
+            let what = sensor.map_or("luminous reflectance".to_owned(), |of| format!("response of {of}"));
+            return Err(RecipeError::CoverOfLrvRange { what: what.into(), low, high });
         }
         let (hardest, max_attempts) = (pilot(&program.at_largest_target()), program.max_attempts);
         if failure(hardest, max_attempts) > TOLERABLE_FAILURE {
-            return Err(RecipeError::HopelessLrvRange { low, high, acceptance: hardest, max_attempts });
+            let what = sensor.map_or("luminous reflectances".to_owned(), |of| format!("responses of {of}"));
+            let what = what.into();
+            return Err(RecipeError::HopelessLrvRange { what, low, high, acceptance: hardest, max_attempts });
         }
         Ok(Recipe {
             settings: self.settings(),
@@ -294,22 +394,73 @@ impl RecipeBuilder {
         })
     }
 
+    /// The recipe of draws that are given responses, tried at those of the model's mean.
+    fn given_its_own(self, program: Program) -> Result<Recipe, RecipeError> {
+        let sensors = self.given.as_ref().expect("the program is given responses");
+        let weights = program::weights(&self.model, self.covariance_scale);
+        let mean = self.responses(sensors, &weights)?.offset;
+        let program_of_mean = program.at(&mean);
+        self.centre(&program_of_mean, &feasibility::half_spaces(&program_of_mean))?;
+        let acceptance = pilot(&program_of_mean);
+        Ok(Recipe {
+            settings: self.settings(),
+            probability: acceptance,
+            acceptance: acceptance.max(1.0 / f64::from(self.max_attempts)),
+            model: self.model,
+            program,
+            cover: None,
+        })
+    }
+
+    /// The program of the model's own Gaussian, and the map of the responses that draws are given.
+    pub(super) fn free(&self) -> Result<(Program, Affine), RecipeError> {
+        let weights = program::weights(&self.model, self.covariance_scale);
+        let sensors = self.given.as_ref().expect("the recipe gives draws responses");
+        Ok((Program::new(&self.model, &weights), self.responses(sensors, &weights)?))
+    }
+
+    /// The map of the responses of sensors that draws are given.
+    fn responses(&self, sensors: &Sensors, weights: &Affine) -> Result<Affine, RecipeError> {
+        let others = [
+            ("a target luminous reflectance", self.lrv.is_some()),
+            ("a target response", self.target.is_some()),
+            ("target tristimulus values", self.xyz.is_some()),
+            ("an intensity", self.intensity.is_some()),
+            ("a cover", self.proposal == ProposalKind::Cover),
+        ];
+        if let Some((other, _)) = others.into_iter().find(|(_, is_set)| *is_set) {
+            return Err(RecipeError::GivenAnd { other });
+        }
+        let grid = self.model.grid();
+        let seen = match self.model.kind() {
+            SpectrumKind::Illuminant => sensors.emitted_weights(grid)?,
+            SpectrumKind::Reflectance => {
+                sensors.reflected_weights(&self.outputs.light(grid)?, grid, ResponseScale::White)?
+            }
+        };
+        Ok(Program::new(&self.model, weights).spectrum.project(&seen))
+    }
+
+    fn too_few_directions(&self, sensors: &Sensors) -> RecipeError {
+        let (name, channels) = (sensors.name().to_owned(), sensors.len());
+        RecipeError::TooFewToGive { name, channels, components: self.model.components() }
+    }
+
     /// Effect of the given tristimulus values on this model.
     pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
         if self.model.kind() == SpectrumKind::Illuminant {
             return Err(RecipeError::XyzOfIlluminant);
         }
-        if self.lrv.is_some() {
+        if self.lrv.is_some() || self.target.is_some() {
             return Err(RecipeError::XyzAndLrv);
         }
         let (_, map) = self.seen(weights)?;
         Condition::new(&map).ok_or(RecipeError::TooFewDirections)
     }
 
-    /// The program without a target, and the map of its tristimulus values under D65.
+    /// The program without a target, and the map of its tristimulus values.
     fn seen(&self, weights: &Affine) -> Result<(Program, Affine), RecipeError> {
-        let grid = self.model.grid();
-        let seen = colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid.clone()))?;
+        let seen = self.outputs.reflected_xyz_weights(self.model.grid())?;
         let program = Program::new(&self.model, weights);
         let xyz = program.spectrum.project(&seen);
         Ok((program, xyz))
@@ -320,13 +471,13 @@ impl RecipeBuilder {
     fn nearest(&self, xyz: [f64; 3]) -> Option<[f64; 3]> {
         let weights = program::weights(&self.model, self.covariance_scale);
         let (program, map) = self.seen(&weights).ok()?;
-        let nearest = feasibility::nearest_xyz(&program, &map, xyz)?;
+        let nearest = feasibility::nearest(&program, &map, &xyz)?;
         let steps = (0..16).map(|doublings| 1e-4 * f64::from(1 << doublings)).take_while(|&part| part < 1.0);
         let inwards = |part| [0, 1, 2].map(|i| nearest[i] + part * (map.offset[i] - nearest[i]));
         let rounded = steps.map(inwards).map(|xyz| xyz.map(|v| (v * 1e4).round() / 1e4));
         let condition = self.condition(&weights).ok()?;
         rounded.into_iter().find(|&xyz| {
-            let program = Program::new(&self.model, &condition.given(xyz, &weights));
+            let program = Program::new(&self.model, &condition.given(&xyz, &weights));
             !matches!(feasibility::room(&feasibility::half_spaces(&program)), Room::None { .. })
                 && failure(pilot(&program), self.max_attempts) <= TOLERABLE_FAILURE
         })
@@ -357,23 +508,80 @@ impl RecipeBuilder {
         Ok(Program { intensity: Some(law), ..program })
     }
 
-    fn target(&self, lrv: Lrv) -> Result<LrvTarget, RecipeError> {
-        // Far below, spectra would round to 0; just below 1, to 1.
-        let check = |lrv: f64| match (1e-30..1.0).contains(&f64::from(lrv as f32)) {
-            true => Ok(lrv),
-            false => Err(RecipeError::Lrv(lrv)),
-        };
-        let lrv = match lrv {
-            Lrv::Fixed(lrv) => LrvLaw::Fixed(check(lrv)?),
-            Lrv::Uniform(low, high) if check(low)? < check(high)? => LrvLaw::uniform(low, high),
-            Lrv::Uniform(low, high) => return Err(RecipeError::LrvRange { low, high }),
-        };
-        if self.model.kind() == SpectrumKind::Illuminant {
-            return Err(RecipeError::LrvOfIlluminant);
+    /// Property that every draw is given.
+    fn aim(&self) -> Aim {
+        match (self.lrv, &self.target, self.xyz) {
+            _ if self.given.is_some() => Aim::Given,
+            (Some(_), ..) => Aim::Lrv,
+            (None, Some(_), _) => Aim::Response,
+            (None, None, Some(_)) => Aim::Xyz,
+            (None, None, None) => Aim::Nothing,
         }
+    }
+
+    /// The target that spectra are scaled to.
+    fn scaling(&self) -> Result<Option<LrvTarget>, RecipeError> {
+        let bounds = self.bounds.unwrap_or_default();
+        match (self.lrv, &self.target) {
+            (None, None) => Ok(None),
+            (Some(_), Some(target)) => Err(RecipeError::TwoTargets { sensor: target.sensor() }),
+            (Some(lrv), None) => {
+                let law = law(lrv, RecipeError::Lrv, |low, high| RecipeError::LrvRange { low, high })?;
+                if self.model.kind() == SpectrumKind::Illuminant {
+                    return Err(RecipeError::LrvOfIlluminant);
+                }
+                let [_, weights, _] = self.outputs.reflected_xyz_weights(self.model.grid())?;
+                Ok(Some(LrvTarget { lrv: law, weights, bounds }))
+            }
+            (None, Some(target)) => {
+                let sensor = || target.sensor();
+                let law = law(
+                    target.response,
+                    |response| RecipeError::Response { sensor: sensor(), response },
+                    |low, high| RecipeError::ResponseRange { sensor: sensor(), low, high },
+                )?;
+                if self.model.kind() == SpectrumKind::Illuminant {
+                    return Err(RecipeError::ResponseOfIlluminant { sensor: sensor() });
+                }
+                Ok(Some(LrvTarget { lrv: law, weights: self.response_weights(target)?, bounds }))
+            }
+        }
+    }
+
+    /// The weights of the bands in the response that is aimed at.
+    fn response_weights(&self, target: &ResponseTarget) -> Result<Vec<f64>, RecipeError> {
         let grid = self.model.grid();
-        let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid.clone()))?;
-        Ok(LrvTarget { lrv, weights, bounds: self.bounds.unwrap_or_default() })
+        let channel = target.sensors.channel(&target.channel)?;
+        let light = self.outputs.light(grid)?;
+        let mut weights = target.sensors.reflected_weights(&light, grid, ResponseScale::White)?;
+        let weights = weights.swap_remove(channel);
+        // Where a weight is negative, a spectrum that is positive may have a response that no factor takes to the target.
+        if let Some(band) = weights.iter().position(|weight| *weight < 0.0) {
+            return Err(RecipeError::from(SensorError::Negative {
+                name: target.sensors.name().to_owned(),
+                channel: target.channel.clone(),
+                wavelength: grid.wavelength(band),
+            }));
+        }
+        Ok(weights)
+    }
+}
+
+/// The law of a target, if its values are those of one.
+fn law(
+    target: Lrv,
+    value: impl Fn(f64) -> RecipeError,
+    range: impl Fn(f64, f64) -> RecipeError,
+) -> Result<LrvLaw, RecipeError> {
+    // Far below, spectra would round to 0; just below 1, to 1.
+    let check = |target: f64| match (1e-30..1.0).contains(&f64::from(target as f32)) {
+        true => Ok(target),
+        false => Err(value(target)),
+    };
+    match target {
+        Lrv::Fixed(fixed) => Ok(LrvLaw::Fixed(check(fixed)?)),
+        Lrv::Uniform(low, high) if check(low)? < check(high)? => Ok(LrvLaw::uniform(low, high)),
+        Lrv::Uniform(low, high) => Err(range(low, high)),
     }
 }
 

@@ -1,9 +1,11 @@
 //! Errors of recipes.
 
 use super::pilot::{PILOT, TOLERABLE_FAILURE, failure};
+use crate::colorimetry::IlluminantError;
 use crate::cover::MOST_COMPONENTS;
 use crate::grid::Grid;
 use crate::quantity::Quantity;
+use crate::sensors::SensorError;
 use crate::wording::counted;
 
 /// Error returned by [`RecipeBuilder::build`](crate::RecipeBuilder::build).
@@ -19,19 +21,41 @@ pub enum RecipeError {
     Invisible(Grid),
     #[error("no reflectance of this model has a luminous reflectance of {lrv}: the largest is {largest:.6}")]
     UnreachableLrv { lrv: f64, largest: f64 },
+    #[error("a target response of {sensor} of {response}: {}", not_an_lrv(*response))]
+    Response { sensor: String, response: f64 },
+    #[error(
+        "a target response of {sensor} belongs to reflectances, and this model is of illuminants: scale them by an \
+         intensity"
+    )]
+    ResponseOfIlluminant { sensor: String },
+    #[error(
+        "no reflectance of this model has a response of {sensor} of {response}: the largest is {largest:.6}"
+    )]
+    UnreachableResponse { sensor: String, response: f64, largest: f64 },
+    #[error("a target response of {sensor} between {low} and {high}: the first must be below the second")]
+    ResponseRange { sensor: String, low: f64, high: f64 },
+    #[error(
+        "a target luminous reflectance and a target response of {sensor}: a spectrum is scaled to one of them, so leave \
+         the other out"
+    )]
+    TwoTargets { sensor: String },
+    #[error(transparent)]
+    Sensors(Box<SensorError>),
+    #[error(transparent)]
+    Illuminant(#[from] IlluminantError),
     #[error("a target luminous reflectance between {low} and {high}: the first must be below the second")]
     LrvRange { low: f64, high: f64 },
     #[error(
-        "too few candidates would be accepted at the upper end of target luminous reflectances between {low} and \
+        "too few candidates would be accepted at the upper end of target {what} between {low} and \
          {high}: {}",
         hopeless(*acceptance, *max_attempts, "lower that end, or ask for one target, for which covers can propose")
     )]
-    HopelessLrvRange { low: f64, high: f64, acceptance: f64, max_attempts: u32 },
+    HopelessLrvRange { what: Box<str>, low: f64, high: f64, acceptance: f64, max_attempts: u32 },
     #[error(
-        "no cover serves every target luminous reflectance between {low} and {high}, each of which bounds the spectrum \
+        "no cover serves every target {what} between {low} and {high}, each of which bounds the spectrum \
          in its own way: let plain rejection propose, bound only the spectrum before scaling, or ask for one target"
     )]
-    CoverOfLrvRange { low: f64, high: f64 },
+    CoverOfLrvRange { what: Box<str>, low: f64, high: f64 },
     #[error("tristimulus values of {0:?}: they must be finite, and Y above 0 and below 1")]
     Xyz([f64; 3]),
     #[error("target tristimulus values belong to reflectances, and this model is of illuminants")]
@@ -43,6 +67,15 @@ pub enum RecipeError {
          with more components"
     )]
     TooFewDirections,
+    #[error(
+        "{other} beside responses that each draw is given: leave it out, for these say what the draws are like"
+    )]
+    GivenAnd { other: &'static str },
+    #[error(
+        "the {channels} responses of {name} that draws are given take as many directions in which a model varies, and this \
+         one, of {components} components, has no other left or does not vary in all of them: fit it with more components"
+    )]
+    TooFewToGive { name: String, channels: usize, components: usize },
     #[error("{}", unreachable_xyz(*xyz, *nearest))]
     UnreachableXyz { xyz: [f64; 3], nearest: Option<[f64; 3]> },
     #[error("an intensity of {0}: it must be above 0, from 1e-30 to 1e30")]
@@ -99,6 +132,12 @@ pub enum RecipeError {
         hopeless(*acceptance, *max_attempts, "ask for less extreme spectra")
     )]
     Hopeless { acceptance: f64, max_attempts: u32 },
+}
+
+impl From<SensorError> for RecipeError {
+    fn from(error: SensorError) -> RecipeError {
+        RecipeError::Sensors(Box::new(error))
+    }
 }
 
 /// The share of candidates that would be accepted, and what helps besides more attempts.

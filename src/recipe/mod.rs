@@ -7,11 +7,14 @@ mod outputs;
 mod pilot;
 mod scalar;
 mod settings;
+mod target;
 
 pub use builder::RecipeBuilder;
 pub use error::RecipeError;
+pub(crate) use outputs::OutputRequest;
 pub use scalar::{Draw, ScalarSampler};
 pub use settings::RecipeSettings;
+pub use target::ResponseTarget;
 
 use std::ops::Range;
 
@@ -19,11 +22,12 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::affine::Affine;
 use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::model::Model;
 use crate::program::{self, Program, feasibility};
-use crate::quantity::{ArrayFormat, ValueRange};
+use crate::quantity::{ArrayFormat, Quantity, ValueRange};
 use crate::random::real::Real;
 use crate::random::stream::Stream;
 use crate::wgsl::{self, ComputeShader, ModuleOptions, ShaderVariant, WgslError};
@@ -67,8 +71,9 @@ pub enum ProposalKind {
     Cover,
 }
 
-/// The luminous reflectance value (LRV) that reflectances are scaled to: CIE Y of the 1931 2 degree observer under D65,
-/// 1 for a perfect white.
+/// The luminous reflectance value (LRV) that reflectances are scaled to: CIE Y of the recipe's observer under its
+/// illuminant (1931, 2 degrees, and D65 unless asked otherwise), 1 for a perfect white. A [`ResponseTarget`] is scaled to
+/// another response in the same two ways.
 ///
 /// ```
 /// use spectroll::Lrv;
@@ -119,21 +124,6 @@ pub enum Intensity {
     /// For each draw a divisor of one of the model's spectra, chosen at random: the spectra's mean powers, unless the
     /// fit was normalized otherwise.
     Data,
-}
-
-/// The illuminant that reflectances have their XYZ, chromaticity and linear sRGB under.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Illuminant {
-    /// CIE standard illuminant D65: noon daylight.
-    #[default]
-    D65,
-    /// CIE standard illuminant A: incandescent light.
-    A,
-    /// The equal-energy illuminant.
-    E,
-    /// The power in each band, in any unit.
-    Power(Vec<f64>),
 }
 
 /// The scale of an illuminant's tristimulus values.
@@ -222,6 +212,15 @@ impl Recipe {
         self.program.outputs.iter().map(|output| output.format).collect()
     }
 
+    /// Names of the values of a quantity, where each has one of its own: those of responses are the channels of the
+    /// sensors.
+    pub fn channels(&self, quantity: Quantity) -> Vec<String> {
+        match (quantity, &self.settings.sensors) {
+            (Quantity::Responses, Some(sensors)) => sensors.channels().to_vec(),
+            _ => quantity.channels().iter().map(|&name| name.to_owned()).collect(),
+        }
+    }
+
     /// Prepares to draw one at a time, on the CPU: for a few draws, for tests, and for code that lives in `rand`.
     pub fn scalar_sampler<R: Real>(&self) -> ScalarSampler<R> {
         ScalarSampler::new(self)
@@ -232,6 +231,11 @@ impl Recipe {
         self.scalar_sampler().draw(stream, index)
     }
 
+    /// Makes draw `index` of a stream, given responses. For more than one, [`ScalarSampler::draw_given`] is faster.
+    pub fn draw_given<R: Real>(&self, stream: Stream, index: u64, given: &[f32]) -> Draw<R> {
+        self.scalar_sampler().draw_given(stream, index, given)
+    }
+
     /// Writes the draw as a WGSL module without bindings or entry points, for shaders of a host on any version of
     /// wgpu or any other engine. Every name has `prefix` and an underscore before it, so that several recipes fit in
     /// one shader:
@@ -239,10 +243,13 @@ impl Recipe {
     /// - `PREFIX_draw(seed: vec2<u32>, index: vec2<u32>) -> PREFIX_Draw` makes the same draw as every engine. Its
     ///   member `attempts` is the number of candidates that took, 0 where it failed; the rest is for the functions below.
     ///   `PREFIX_draw_in(stream, seed, index)` draws from a [`Stream`], given its number.
+    /// - where each draw is [given](RecipeBuilder::given) responses, `PREFIX_draw_given(seed, index, c)` takes their
+    ///   place: c is a vector of two to four responses, or an array of more;
     /// - for spectra, `PREFIX_at(draw, band) -> f32` and `PREFIX_spectrum(draw) -> array<f32, bands>`;
     /// - for weights, `PREFIX_weights(draw) -> array<f32, components>`;
     /// - for XYZ and linear sRGB, `PREFIX_xyz(draw) -> vec3<f32>` and `PREFIX_linear_srgb`;
     /// - for chromaticity, `PREFIX_chromaticity(draw) -> vec2<f32>`;
+    /// - for responses, `PREFIX_responses(draw) -> array<f32, channels>`;
     /// - for LRV and intensity, `PREFIX_lrv(draw) -> f32` and `PREFIX_intensity`.
     ///
     /// - the constants `PREFIX_BANDS`, `PREFIX_FIRST_NM` and, of an even grid, `PREFIX_STEP_NM`; beside spectra
@@ -305,6 +312,12 @@ impl Recipe {
         ComputeShader::new(&self.program, variant)
     }
 
+    /// The program of the model's own Gaussian, and the map of the responses that this recipe's draws are given.
+    pub(crate) fn free(&self) -> (Program, Affine) {
+        let builder = self.settings.builder(&self.model);
+        builder.free().expect("the recipe was built from these settings")
+    }
+
     pub(crate) fn program(&self) -> &Program {
         &self.program
     }
@@ -313,8 +326,9 @@ impl Recipe {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::colorimetry::{Illuminant, Observer};
     use crate::program::Bounds;
-    use crate::quantity::Quantity;
+    use crate::sensors::{ResponseScale, Sensors};
 
     fn message(recipe: RecipeBuilder) -> String {
         recipe.build().unwrap_err().to_string()
@@ -347,6 +361,8 @@ mod tests {
     fn what_cannot_be_drawn_says_why() {
         let surface = Recipe::builder(&Model::builtin("munsell-vrhel").unwrap());
         let light = Recipe::builder(&Model::builtin("granada").unwrap());
+        let cones = || Sensors::builtin("ss2").unwrap();
+        let aim = |channel: &str, response: f64| ResponseTarget::new(cones(), channel, response);
         for (recipe, part) in [
             (surface.clone().lrv(f64::NAN), "NaN: it is a fraction above 0 and below 1"),
             (surface.clone().lrv(0.0), "reflectance of 0:"),
@@ -384,9 +400,44 @@ mod tests {
             (surface.clone().bounds(Bounds::Both), "needs a target luminous reflectance"),
             (
                 surface.clone().illuminant(Illuminant::E),
-                "needs the quantity xyz, chromaticity or linear_srgb of reflectances",
+                "needs the quantity xyz, chromaticity, linear_srgb, lrv or responses of reflectances",
             ),
             (surface.clone().xyz_scale(XyzScale::UnitY).quantities([Quantity::Xyz]), "of illuminants"),
+            (surface.clone().observer(Observer::Cie1964), "an observer needs the quantity xyz,"),
+            (surface.clone().sensors(cones()), "a set of sensors needs the quantity responses"),
+            (surface.clone().quantities([Quantity::Responses]), "it needs a set of sensors"),
+            (surface.clone().quantities([Quantity::ColorSignal]), "it is of surfaces in scenes"),
+            (
+                surface.clone().response_scale(ResponseScale::Absolute),
+                "a scale of responses needs the quantity responses",
+            ),
+            (
+                light
+                    .clone()
+                    .sensors(cones())
+                    .response_scale(ResponseScale::White)
+                    .quantities([Quantity::Responses]),
+                "relative to white needs reflectances",
+            ),
+            (surface.clone().target(aim("L", 0.0)), "a target response of ss2.L of 0:"),
+            (surface.clone().target(aim("L", 40.0)), "did you mean 0.4?"),
+            (surface.clone().target(aim("L", 0.9999)), "a response of ss2.L of 0.9999: the largest is 0.99"),
+            (surface.clone().target(aim("K", 0.3)), "ss2 has no channel \"K\"; there are L, M, S"),
+            (surface.clone().target(aim("L", 0.3)).lrv(0.3), "scaled to one of them, so leave the other out"),
+            (surface.clone().target(aim("L", 0.3)).xyz([0.3; 3]), "leave the target for it out"),
+            (light.clone().target(aim("L", 0.3)), "and this model is of illuminants"),
+            (
+                surface
+                    .clone()
+                    .target(ResponseTarget::new(cones(), "S", 0.2..0.6))
+                    .bounds(Bounds::Both)
+                    .proposal(ProposalKind::Cover),
+                "no cover serves every target response of ss2.S between 0.2 and 0.6",
+            ),
+            (
+                surface.clone().illuminant(Illuminant::Daylight(3000.0)).quantities([Quantity::Lrv]),
+                "a daylight of 3000 K",
+            ),
         ] {
             let text = message(recipe);
             assert!(text.contains(part), "{text}");

@@ -1,12 +1,14 @@
 //! Outputs of a program from the quantities that a recipe asks for: each as a map of the normals, folded in f64.
 
-use super::{Illuminant, RecipeError, XyzScale};
+use super::{RecipeError, XyzScale};
 use crate::affine::Affine;
-use crate::colorimetry;
+use crate::colorimetry::{self, Illuminant, Observer};
 use crate::dataset::SpectrumKind;
+use crate::grid::Grid;
 use crate::model::Model;
 use crate::program::{LrvLaw, Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity};
+use crate::sensors::{ResponseScale, Sensors};
 
 /// Quantities that a recipe asks for, and their settings.
 #[derive(Clone, Debug)]
@@ -17,9 +19,29 @@ pub(crate) struct OutputRequest {
     pub(crate) spectra: Dtype,
     /// The illuminant of reflectances, if it is not D65.
     pub(crate) illuminant: Option<Illuminant>,
+    pub(crate) observer: Option<Observer>,
+    pub(crate) sensors: Option<Sensors>,
+    pub(crate) response_scale: Option<ResponseScale>,
     pub(crate) xyz_scale: Option<XyzScale>,
     /// The intensity of every draw, where it is the same.
     pub(crate) fixed: Option<f64>,
+    pub(crate) aim: Aim,
+}
+
+/// Property that every draw is given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Aim {
+    /// None.
+    #[default]
+    Nothing,
+    /// A luminous reflectance, to which its spectrum is scaled.
+    Lrv,
+    /// The response of a sensor, to which its spectrum is scaled.
+    Response,
+    /// Tristimulus values, which its distribution is conditioned on.
+    Xyz,
+    /// Responses of its own, which its distribution is conditioned on.
+    Given,
 }
 
 impl Default for OutputRequest {
@@ -29,9 +51,100 @@ impl Default for OutputRequest {
             layout: Layout::default(),
             spectra: Dtype::F32,
             illuminant: None,
+            observer: None,
+            sensors: None,
+            response_scale: None,
             xyz_scale: None,
             fixed: None,
+            aim: Aim::default(),
         }
+    }
+}
+
+impl OutputRequest {
+    /// Refuses settings that would change nothing.
+    fn check(&self, kind: SpectrumKind) -> Result<(), RecipeError> {
+        let pointless = |setting, needs| Err(RecipeError::Pointless { setting, needs });
+        let wants = |list: &[Quantity]| self.quantities.iter().any(|quantity| list.contains(quantity));
+        let is_reflectance = kind == SpectrumKind::Reflectance;
+        let has_colours = wants(Quantity::COLOURS) || wants(&[Quantity::Lrv]);
+        let has_responses = wants(&[Quantity::Responses]);
+        let is_lit = has_colours || has_responses || self.aim != Aim::Nothing;
+        if self.illuminant.is_some() && !(is_reflectance && is_lit) {
+            return pointless(
+                "an illuminant for reflectances",
+                "the quantity xyz, chromaticity, linear_srgb, lrv or responses of reflectances",
+            );
+        }
+        if self.observer.is_some() && !(has_colours || matches!(self.aim, Aim::Lrv | Aim::Xyz)) {
+            return pointless(
+                "an observer",
+                "the quantity xyz, chromaticity, linear_srgb or lrv, or a target of these",
+            );
+        }
+        if self.sensors.is_some() && !has_responses {
+            return pointless("a set of sensors", "the quantity responses");
+        }
+        if self.response_scale.is_some() && !has_responses {
+            return pointless("a scale of responses", "the quantity responses");
+        }
+        if self.response_scale == Some(ResponseScale::White) && !is_reflectance {
+            return pointless(
+                "a scale of responses relative to white",
+                "reflectances: illuminants have none",
+            );
+        }
+        // A chromaticity is the same in every scale.
+        if self.xyz_scale.is_some() && (is_reflectance || !wants(&[Quantity::Xyz, Quantity::LinearSrgb])) {
+            return pointless(
+                "a scale of tristimulus values",
+                "the quantity xyz or linear_srgb of illuminants",
+            );
+        }
+        Ok(())
+    }
+
+    pub(crate) fn observer(&self) -> Observer {
+        self.observer.unwrap_or_default()
+    }
+
+    /// Power in each band of the illuminant that reflectances are seen under.
+    pub(crate) fn light(&self, grid: &Grid) -> Result<Vec<f64>, RecipeError> {
+        let illuminant = self.illuminant.as_ref().unwrap_or(&Illuminant::D65);
+        illuminant.check()?;
+        let power = illuminant.power(grid);
+        if power.len() != grid.len() {
+            return Err(RecipeError::Light { found: power.len(), expected: grid.len() });
+        }
+        if !power.iter().all(|power| power.is_finite() && *power >= 0.0) {
+            return Err(RecipeError::DarkLight);
+        }
+        Ok(power)
+    }
+
+    /// Weights of the bands in X, Y and Z of a reflectance.
+    pub(crate) fn reflected_xyz_weights(&self, grid: &Grid) -> Result<[Vec<f64>; 3], RecipeError> {
+        let weights = self.observer().xyz_weights_under(&self.light(grid)?, grid);
+        weights.ok_or(match self.illuminant {
+            None | Some(Illuminant::D65) => RecipeError::Invisible(grid.clone()),
+            _ => RecipeError::DarkLight,
+        })
+    }
+
+    /// Weights of the bands in the response of each sensor.
+    pub(crate) fn response_weights(
+        &self,
+        sensors: &Sensors,
+        kind: SpectrumKind,
+        grid: &Grid,
+    ) -> Result<Vec<Vec<f64>>, RecipeError> {
+        Ok(match kind {
+            SpectrumKind::Illuminant => sensors.emitted_weights(grid)?,
+            SpectrumKind::Reflectance => {
+                let scale = self.response_scale.unwrap_or_default();
+                sensors.reflected_weights(&self.light(grid)?, grid, scale)?
+            }
+        })
     }
 }
 
@@ -48,21 +161,7 @@ pub(crate) fn outputs(
     if quantities.is_empty() {
         return Err(RecipeError::Nothing);
     }
-    let has_colours = quantities.iter().any(|quantity| Quantity::COLOURS.contains(quantity));
-    // A chromaticity is the same in every scale.
-    let has_scaled = quantities.iter().any(|q| matches!(q, Quantity::Xyz | Quantity::LinearSrgb));
-    if asked.illuminant.is_some() && !(has_colours && model.kind() == SpectrumKind::Reflectance) {
-        let (setting, needs) = (
-            "an illuminant for reflectances",
-            "the quantity xyz, chromaticity or linear_srgb of reflectances",
-        );
-        return Err(RecipeError::Pointless { setting, needs });
-    }
-    if asked.xyz_scale.is_some() && !(has_scaled && model.kind() == SpectrumKind::Illuminant) {
-        let (setting, needs) =
-            ("a scale of tristimulus values", "the quantity xyz or linear_srgb of illuminants");
-        return Err(RecipeError::Pointless { setting, needs });
-    }
+    asked.check(model.kind())?;
     let output = |quantity| {
         let source = source(quantity, asked, model, program, weights)?;
         let width = match &source {
@@ -113,20 +212,30 @@ fn source(
             let sum = xyz.project(&[[1.0; 3]]);
             Source::Map(xyz.project(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), Unit::Over(sum))
         }
-        Quantity::Lrv => match (&program.target, model.kind()) {
-            (_, SpectrumKind::Illuminant) => {
+        Quantity::Lrv => match (&program.target, asked.aim, model.kind()) {
+            (_, _, SpectrumKind::Illuminant) => {
                 return Err(unless("illuminants have no luminous reflectance"));
             }
-            (Some(target), _) => match target.lrv {
+            (Some(target), Aim::Lrv, _) => match target.lrv {
                 LrvLaw::Fixed(lrv) => Source::Map(Affine::constant(lrv, k), Unit::One),
                 LrvLaw::Uniform { .. } => Source::TargetLrv,
             },
-            (None, _) => {
-                let grid = model.grid();
-                let weights = colorimetry::lrv_weights(grid).ok_or(RecipeError::Invisible(grid.clone()))?;
-                Source::Map(program.spectrum.project(&[weights]), Unit::One)
+            _ => {
+                let [_, y, _] = asked.reflected_xyz_weights(model.grid())?;
+                Source::Map(program.spectrum.project(&[y]), scaled)
             }
         },
+        Quantity::Responses => {
+            let sensors = asked.sensors.as_ref();
+            let sensors = sensors.ok_or(unless("it needs a set of sensors, and the recipe has none"))?;
+            Source::Map(
+                program.spectrum.project(&asked.response_weights(sensors, model.kind(), model.grid())?),
+                scaled,
+            )
+        }
+        Quantity::ColorSignal => {
+            return Err(unless("it is of surfaces in scenes, under the lights of each"));
+        }
         Quantity::Attempts => Source::Status,
         Quantity::Intensity => match (&program.intensity, asked.fixed) {
             (Some(_), _) => Source::Intensity,
@@ -138,21 +247,8 @@ fn source(
 
 /// The weights of the bands in X, Y and Z.
 fn xyz_weights(asked: &OutputRequest, model: &Model) -> Result<[Vec<f64>; 3], RecipeError> {
-    let grid = model.grid();
-    if model.kind() == SpectrumKind::Illuminant {
-        return Ok(colorimetry::emitted_xyz_weights(grid));
+    match model.kind() {
+        SpectrumKind::Illuminant => Ok(asked.observer().emitted_xyz_weights(model.grid())),
+        SpectrumKind::Reflectance => asked.reflected_xyz_weights(model.grid()),
     }
-    let power = match asked.illuminant.as_ref().unwrap_or(&Illuminant::D65) {
-        Illuminant::D65 => return colorimetry::xyz_weights(grid).ok_or(RecipeError::Invisible(grid.clone())),
-        Illuminant::A => colorimetry::illuminant_a(grid),
-        Illuminant::E => vec![1.0; grid.len()],
-        Illuminant::Power(power) => power.clone(),
-    };
-    if power.len() != grid.len() {
-        return Err(RecipeError::Light { found: power.len(), expected: grid.len() });
-    }
-    if !power.iter().all(|power| power.is_finite() && *power >= 0.0) {
-        return Err(RecipeError::DarkLight);
-    }
-    colorimetry::xyz_weights_under(&power, grid).ok_or(RecipeError::DarkLight)
 }

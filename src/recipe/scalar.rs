@@ -38,8 +38,20 @@ impl<R: Real> ScalarSampler<R> {
     }
 
     /// Makes draw `index` of a stream.
+    ///
+    /// # Panics
+    /// Where the recipe gives draws responses, which [`draw_given`](Self::draw_given) takes.
     pub fn draw(&self, stream: Stream, index: u64) -> Draw<R> {
         self.drawn(self.kernel.draw(stream, index))
+    }
+
+    /// Makes draw `index` of a stream, given responses: one for each channel of the recipe's
+    /// [given sensors](crate::RecipeBuilder::given). All quantities are 0 where no candidate was accepted.
+    ///
+    /// # Panics
+    /// Where there are not as many.
+    pub fn draw_given(&self, stream: Stream, index: u64, given: &[f32]) -> Draw<R> {
+        self.drawn(self.kernel.draw_given(stream, index, given))
     }
 
     fn drawn(&self, (values, status): (Vec<Vec<R>>, DrawStatus)) -> Draw<R> {

@@ -3,11 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    DEFAULT_MAX_ATTEMPTS, Illuminant, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder, XyzScale,
+    DEFAULT_MAX_ATTEMPTS, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder, ResponseTarget, XyzScale,
 };
+use crate::colorimetry::{Illuminant, Observer};
 use crate::model::Model;
 use crate::program::Bounds;
 use crate::quantity::Quantity;
+use crate::sensors::{ResponseScale, Sensors};
 
 /// Everything that distinguishes the draws of a recipe from other draws of the same model. Data sets record it under
 /// `recipe`, so the serialised names are part of their format.
@@ -16,9 +18,15 @@ use crate::quantity::Quantity;
 pub struct RecipeSettings {
     /// The target luminous reflectance (LRV).
     pub lrv: Option<Lrv>,
-    /// The target tristimulus values under D65.
+    /// The target tristimulus values, of the observer and under the illuminant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub xyz: Option<[f64; 3]>,
+    /// The target response of a sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<ResponseTarget>,
+    /// The sensors whose responses each draw is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub given: Option<Sensors>,
     /// Spectrum that must lie between 0 and 1 where there is a target LRV.
     pub bounds: Bounds,
     /// The factor of the weights' covariance.
@@ -28,8 +36,17 @@ pub struct RecipeSettings {
     pub intensity: Option<Intensity>,
     /// The quantities of each draw.
     pub quantities: Vec<Quantity>,
-    /// The illuminant of reflectances' XYZ, chromaticity and linear sRGB.
+    /// The illuminant of reflectances' responses, XYZ, chromaticity, linear sRGB and LRV, and of targets.
     pub illuminant: Illuminant,
+    /// The observer of XYZ, chromaticity, linear sRGB and LRV, and of their targets.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub observer: Observer,
+    /// The sensors of responses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensors: Option<Sensors>,
+    /// The scale of responses; `None` is relative to white for reflectances, and absolute for illuminants.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub response_scale: Option<ResponseScale>,
     /// The scale of illuminants' XYZ and linear sRGB.
     pub xyz_scale: XyzScale,
     /// Source of candidates, as it was asked for.
@@ -43,11 +60,16 @@ impl Default for RecipeSettings {
         RecipeSettings {
             lrv: None,
             xyz: None,
+            target: None,
+            given: None,
             bounds: Bounds::default(),
             covariance_scale: 1.0,
             intensity: None,
             quantities: vec![Quantity::Spectra],
             illuminant: Illuminant::default(),
+            observer: Observer::default(),
+            sensors: None,
+            response_scale: None,
             xyz_scale: XyzScale::default(),
             proposal: ProposalKind::default(),
             max_attempts: DEFAULT_MAX_ATTEMPTS,
@@ -68,7 +90,13 @@ impl RecipeSettings {
         if let Some(lrv) = self.lrv {
             builder = builder.lrv(lrv);
         }
-        if self.lrv.is_some() || self.bounds != default.bounds {
+        if let Some(target) = &self.target {
+            builder = builder.target(target.clone());
+        }
+        if let Some(sensors) = &self.given {
+            builder = builder.given(sensors.clone());
+        }
+        if self.lrv.is_some() || self.target.is_some() || self.bounds != default.bounds {
             builder = builder.bounds(self.bounds);
         }
         if let Some(xyz) = self.xyz {
@@ -80,11 +108,24 @@ impl RecipeSettings {
         if self.illuminant != default.illuminant {
             builder = builder.illuminant(self.illuminant.clone());
         }
+        if self.observer != default.observer {
+            builder = builder.observer(self.observer);
+        }
+        if let Some(sensors) = &self.sensors {
+            builder = builder.sensors(sensors.clone());
+        }
+        if let Some(scale) = self.response_scale {
+            builder = builder.response_scale(scale);
+        }
         if self.xyz_scale != default.xyz_scale {
             builder = builder.xyz_scale(self.xyz_scale);
         }
         builder
     }
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// A target LRV as it is written: a number, or `{"uniform": [low, high]}`.
@@ -134,6 +175,10 @@ mod tests {
             illuminant: Illuminant::Power(vec![1.0, 2.0]),
             xyz_scale: XyzScale::UnitY,
             proposal: ProposalKind::Cover,
+            target: Some(ResponseTarget::new(Sensors::builtin("ss2").unwrap(), "L", 0.2..0.6)),
+            observer: Observer::Cie1964,
+            sensors: Some(Sensors::new("own", ["a"], &[500.0, 600.0], &[vec![0.0, 1.0]]).unwrap()),
+            response_scale: Some(ResponseScale::Absolute),
             ..RecipeSettings::default()
         };
         let text = serde_json::to_string(&other).unwrap();
@@ -144,6 +189,10 @@ mod tests {
             "linear_srgb",
             "{\"power\":[1.0,2.0]}",
             "\"unit-y\"",
+            r#""target":{"sensors":"ss2","channel":"L","response":{"uniform":[0.2,0.6]}}"#,
+            r#""observer":"cie1964""#,
+            r#""sensors":{"name":"own","channels":["a"],"wavelengths":[500.0,600.0],"functions":[[0.0,1.0]]}"#,
+            r#""response_scale":"absolute""#,
         ] {
             assert!(text.contains(name), "{name} in {text}");
         }
@@ -152,6 +201,11 @@ mod tests {
         let text = serde_json::to_string(&ranged).unwrap();
         assert_eq!(text, plain.replace("null,\"bounds", "{\"uniform\":[0.2,0.6]},\"bounds"));
         assert_eq!(serde_json::from_str::<RecipeSettings>(&text).unwrap(), ranged);
+        let named = |illuminant: Illuminant| serde_json::to_string(&illuminant).unwrap();
+        assert_eq!(
+            named(Illuminant::Daylight(5600.0)) + &named(Illuminant::F11),
+            "{\"daylight\":5600.0}\"f11\""
+        );
         let simple = |intensity| serde_json::to_string(&intensity).unwrap();
         assert_eq!(simple(Intensity::Data) + &simple(Intensity::Fixed(2.0)), r#""data"{"fixed":2.0}"#);
     }

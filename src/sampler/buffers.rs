@@ -19,11 +19,14 @@ pub struct PrepareOptions<'a> {
     /// Part of a buffer of the host's that has the indices of a list, whose usages have `STORAGE`; otherwise one is made,
     /// of zeros, with the usage `COPY_DST`: [`Prepared::indices`].
     pub indices: Option<wgpu::BufferBinding<'a>>,
+    /// Part of a buffer of the host's with the f32 responses that each draw is given, draw by draw, for recipes with
+    /// [given sensors](crate::RecipeBuilder::given), whose usages have `STORAGE`. Passes read what it holds when they run.
+    pub given: Option<wgpu::BufferBinding<'a>>,
 }
 
 impl Default for PrepareOptions<'_> {
     fn default() -> Self {
-        PrepareOptions { usages: BufferUsages::COPY_SRC, outputs: Vec::new(), indices: None }
+        PrepareOptions { usages: BufferUsages::COPY_SRC, outputs: Vec::new(), indices: None, given: None }
     }
 }
 
@@ -37,9 +40,12 @@ impl Sampler {
         }
         let alignment = u64::from(limits.min_storage_buffer_offset_alignment);
         let outputs = options.outputs.iter().map(|(quantity, part)| (BindingRole::Output(*quantity), part));
-        for (role, part) in outputs.chain(options.indices.iter().map(|part| (BindingRole::Indices, part))) {
+        let indices = options.indices.iter().map(|part| (BindingRole::Indices, part));
+        let given = options.given.iter().map(|part| (BindingRole::Given, part));
+        for (role, part) in outputs.chain(indices).chain(given) {
             let what = match role {
                 BindingRole::Output(quantity) => format!("the {quantity} of {} draws", draws.count),
+                BindingRole::Given => format!("the responses that {} draws are given", draws.count),
                 _ => format!("the indices of {} draws", draws.count),
             };
             let needed = self.shader.bytes(role, draws.count);
@@ -70,7 +76,7 @@ impl Sampler {
         let parameters = self.shader.parameters(draws, draws.count);
         let uniform = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
         let parameters = filled(device, "spectroll parameters", uniform, &parameters)?;
-        let (mut progress, mut indices, mut outputs) = (None, None, Vec::new());
+        let (mut progress, mut indices, mut given, mut outputs) = (None, None, None, Vec::new());
         let (storage, copied) = (BufferUsages::STORAGE, BufferUsages::COPY_DST);
         let buffer = |role, label: &str, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -94,6 +100,10 @@ impl Sampler {
                     (part.buffer.clone(), part.offset, part.size)
                 }
                 None => whole(indices.insert(buffer(role, "spectroll indices", storage | copied))),
+            },
+            BindingRole::Given => match &options.given {
+                Some(part) => (part.buffer.clone(), part.offset, part.size),
+                None => whole(given.insert(buffer(role, "spectroll given responses", storage | copied))),
             },
             BindingRole::Output(quantity) => match of_host(quantity) {
                 Some((_, part)) => {
@@ -121,6 +131,7 @@ impl Sampler {
             parameters,
             progress,
             indices,
+            given,
             outputs,
             dispatched: count,
             prepared,

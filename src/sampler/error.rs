@@ -35,6 +35,10 @@ pub enum SamplerError {
     Misaligned { what: String, offset: u64, alignment: u64 },
     #[error("the recipe does not ask for {0}, which a buffer was given for")]
     NotAsked(Quantity),
+    #[error(
+        "the recipe gives each draw {responses} responses, and there are none: prepare it with a buffer of them"
+    )]
+    NothingGiven { responses: usize },
     #[error("the device has no buffer for {label}: it was lost, or has no memory left")]
     NoBuffer { label: &'static str },
     #[error(

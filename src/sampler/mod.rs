@@ -195,7 +195,8 @@ impl Sampler {
         // Four draws, for which padding comes to nothing.
         let is_listed = self.shader.variant().indexing == Indexing::List;
         let indices = is_listed.then(|| self.shader.bytes(BindingRole::Indices, 4));
-        let four = self.formats().iter().map(|format| format.bytes(4)).chain(indices);
+        let given = self.shader.bytes(BindingRole::Given, 4);
+        let four = self.formats().iter().map(|format| format.bytes(4)).chain(indices).chain([given]);
         let four = four.max().expect("something comes out");
         let values = self.formats().iter().map(|format| format.values(4)).max().expect("something comes out");
         let workgroups = u64::from(limits.max_compute_workgroups_per_dimension);
@@ -210,7 +211,8 @@ impl Sampler {
         .expect("there are limits")
     }
 
-    /// Allocates buffers for `draws`, and prepares to record them.
+    /// Allocates buffers for `draws`, and prepares to record them. Draws that are given responses take a buffer of them:
+    /// [`PrepareOptions::given`].
     pub fn prepare(&self, device: &Device, draws: DrawRange) -> Result<Prepared, SamplerError> {
         self.prepare_with(device, draws, &PrepareOptions::default())
     }
@@ -242,6 +244,10 @@ impl Sampler {
         if attempts > largest {
             return Err(SamplerError::TooManyAttempts { attempts, largest });
         }
+        let responses = self.shader.given();
+        if responses > 0 && options.given.is_none() {
+            return Err(SamplerError::NothingGiven { responses });
+        }
         self.prepare_slices(device, draws, options)
     }
 }
@@ -254,7 +260,8 @@ fn layout_entry(binding: &Binding) -> wgpu::BindGroupLayoutEntry {
         ty: wgpu::BindingType::Buffer {
             ty: match binding.role {
                 BindingRole::Parameters => wgpu::BufferBindingType::Uniform,
-                BindingRole::Tables | BindingRole::Cover | BindingRole::Indices => storage(true),
+                BindingRole::Tables | BindingRole::Cover => storage(true),
+                BindingRole::Indices | BindingRole::Given => storage(true),
                 BindingRole::Progress | BindingRole::Output(_) => storage(false),
             },
             has_dynamic_offset: false,

@@ -17,6 +17,8 @@ pub struct Prepared {
     pub(super) progress: Option<wgpu::Buffer>,
     /// Indices of the draws, where they are given in a list.
     pub(super) indices: Option<wgpu::Buffer>,
+    /// Responses that the draws are given, where the buffer is not the host's.
+    pub(super) given: Option<wgpu::Buffer>,
     /// Buffers, in the order of the sampler's formats.
     pub(super) outputs: Vec<wgpu::Buffer>,
     /// Number of draws that a pass has threads for.
@@ -158,6 +160,13 @@ impl Prepared {
     pub(crate) fn set_indices(&self, queue: &wgpu::Queue, draws: Draws) {
         let Some(buffer) = &self.indices else { return };
         queue.write_buffer(buffer, 0, bytemuck::cast_slice(&ComputeShader::indices(draws)));
+    }
+
+    /// Writes the responses that draws are given, no more than were prepared.
+    pub(crate) fn set_given(&self, queue: &wgpu::Queue, draws: Draws) {
+        if let Some(buffer) = &self.given {
+            queue.write_buffer(buffer, 0, bytemuck::cast_slice(draws.given));
+        }
     }
 }
 

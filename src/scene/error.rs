@@ -2,11 +2,14 @@
 
 use std::fmt;
 
+use crate::colorimetry::{Illuminant, IlluminantError};
 use crate::dataset::{DatasetError, SpectrumKind};
 use crate::grid::{Grid, GridError};
 use crate::model::ModelError;
 use crate::quantity::Quantity;
 use crate::recipe::RecipeError;
+use crate::sensors::{SensorError, Sensors};
+use crate::suggestion::closest;
 use crate::wording::counted;
 
 use super::group::QUANTITIES;
@@ -88,6 +91,25 @@ pub enum SceneErrorKind {
     Wavelengths(GridError),
     #[error("{0}; name a built-in one (d65, flat), or a table of one spectrum")]
     Mean(DatasetError),
+    #[error("there are no lights {name:?}{}; {}", meant(&near(name, known)), lights(known))]
+    NoLights { name: String, known: Vec<String> },
+    #[error(transparent)]
+    Sensors(Box<SensorError>),
+    #[error(transparent)]
+    Illuminant(#[from] IlluminantError),
+    #[error("{0:?} is neither a built-in set of sensors ({known}) nor a file", known = Sensors::BUILTIN.join(", "))]
+    NoSensors(String),
+    #[error(
+        "{0:?} is neither an illuminant ({known}, or a daylight as in 5600K) nor a file",
+        known = Illuminant::NAMED.map(|(name, _)| name).join(", ")
+    )]
+    NoIlluminant(String),
+    #[error("{0}; name an illuminant (d65, f11, 5600K), or a table of one spectrum")]
+    Power(DatasetError),
+    #[error("{found} spectra, and an illuminant is one: leave the others out of the table")]
+    Powers { found: usize },
+    #[error("{0}; name a built-in set (ss2, cie1931), or a table of a spectrum for each sensor")]
+    SensorTable(DatasetError),
     #[error("{found} spectra, and a mean is one: leave the others out of the table")]
     Means { found: usize },
     #[error(
@@ -145,18 +167,24 @@ pub(super) struct Fault {
     /// The number of the group.
     pub(super) group: Option<usize>,
     pub(super) key: &'static str,
-    pub(super) problem: SceneErrorKind,
+    pub(super) problem: Box<SceneErrorKind>,
+}
+
+impl From<SensorError> for SceneErrorKind {
+    fn from(error: SensorError) -> SceneErrorKind {
+        SceneErrorKind::Sensors(Box::new(error))
+    }
 }
 
 impl Fault {
     /// A problem of the scene as a whole.
     pub(super) fn of_scene(key: &'static str, problem: SceneErrorKind) -> Fault {
-        Fault { group: None, key, problem }
+        Fault { group: None, key, problem: Box::new(problem) }
     }
 
     /// A problem of a group.
     pub(super) fn of_group(group: usize, key: &'static str, problem: SceneErrorKind) -> Fault {
-        Fault { group: Some(group), key, problem }
+        Fault { group: Some(group), key, problem: Box::new(problem) }
     }
 }
 
@@ -197,6 +225,17 @@ impl fmt::Display for SceneErrorPlace {
 
 fn meant(suggestion: &Option<String>) -> String {
     suggestion.as_ref().map_or_else(String::new, |suggestion| format!(", did you mean {suggestion:?}?"))
+}
+
+fn near(name: &str, known: &[String]) -> Option<String> {
+    closest(name, known.iter().map(String::as_str))
+}
+
+fn lights(known: &[String]) -> String {
+    match known {
+        [] => "the scene has none: add an [[illuminant]]".to_owned(),
+        known => format!("there are {}", known.join(", ")),
+    }
 }
 
 fn builtin() -> String {

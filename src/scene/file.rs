@@ -6,7 +6,7 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use crate::colorimetry;
+use crate::colorimetry::{self, Illuminant, IlluminantError, Observer};
 use crate::dataset::{Dataset, DatasetError, Table};
 use crate::grid::{Extrapolation, Grid};
 use crate::model::Model;
@@ -14,11 +14,12 @@ use crate::plain_file;
 use crate::program::Bounds;
 use crate::quantity::Quantity;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
+use crate::sensors::{ResponseScale, Sensors};
 
 use super::error::{SceneError, SceneErrorKind, SceneErrorPlace};
 use super::group::{
     Base, Copies, Group, Hue, Illuminants, IntensityScope, LrvLevels, QUANTITIES, Surfaces, TargetConstraint,
-    Targets,
+    Targets, Viewing,
 };
 use super::reader::{Entry, Section, Wrong};
 use super::target::{FLAT_IS_NOT_DRAWN, bounds_without_lrv};
@@ -33,7 +34,7 @@ pub const PRESETS: [(&str, &str); 3] = [
 ];
 
 const SCENE: [&str; 6] = ["scenes", "seed", "wavelengths", "illuminant", "surface", "target"];
-const ILLUMINANT: [&str; 10] = [
+const ILLUMINANT: [&str; 12] = [
     "name",
     "model",
     "count",
@@ -44,9 +45,24 @@ const ILLUMINANT: [&str; 10] = [
     "fixed",
     "max_attempts",
     "quantities",
+    "sensors",
+    "observer",
 ];
-const SURFACE: [&str; 7] = ["name", "model", "count", "cov_scale", "fixed", "max_attempts", "quantities"];
-const TARGET: [&str; 12] = [
+const SURFACE: [&str; 12] = [
+    "name",
+    "model",
+    "count",
+    "cov_scale",
+    "fixed",
+    "max_attempts",
+    "quantities",
+    "sensors",
+    "response_scale",
+    "observer",
+    "illuminant",
+    "under",
+];
+const TARGET: [&str; 17] = [
     "name",
     "model",
     "count",
@@ -59,6 +75,11 @@ const TARGET: [&str; 12] = [
     "cov_scale",
     "max_attempts",
     "quantities",
+    "sensors",
+    "response_scale",
+    "observer",
+    "illuminant",
+    "under",
 ];
 
 /// The largest scene file that is read, in bytes.
@@ -113,7 +134,7 @@ impl Scene {
             let own = spans.iter().find(|(key, _)| *key == fault.key).map(|(_, span)| span.clone());
             let header = fault.group.map(|group| file.groups[group].header.clone());
             let group = fault.group.map(|group| file.builder.groups[group].base().name.clone());
-            error(own.or(header), group, fault.key.to_owned(), fault.problem)
+            error(own.or(header), group, fault.key.to_owned(), *fault.problem)
         })
     }
 
@@ -262,7 +283,64 @@ impl Reader<'_> {
                 "a list, as in [\"spectra\", \"xyz\"]",
             )?,
         };
-        Ok(Base { name: name.to_owned(), model, count, covariance_scale, max_attempts, quantities })
+        let viewing = self.viewing(section, model.as_ref())?;
+        Ok(Base { name: name.to_owned(), model, count, covariance_scale, max_attempts, quantities, viewing })
+    }
+
+    /// Settings of what is seen of a group.
+    fn viewing(&self, section: &Section, model: Option<&Model>) -> Result<Viewing, Wrong> {
+        let grid =
+            model.map(|model| model.grid().clone()).or(self.wavelengths.clone()).unwrap_or(Grid::DEFAULT);
+        let sensors = section.get("sensors").map(|entry| self.sensors(&entry)).transpose()?;
+        let scales = [("white", ResponseScale::White), ("absolute", ResponseScale::Absolute)];
+        let response_scale = section.get("response_scale").map(|entry| entry.choice(&scales)).transpose()?;
+        let observers = [Observer::Cie1931, Observer::Cie1964].map(|observer| (observer.name(), observer));
+        let observer = section.get("observer").map(|entry| entry.choice(&observers)).transpose()?;
+        let observer = observer.filter(|observer| *observer != Observer::default());
+        let illuminant = section.get("illuminant").map(|entry| self.illuminant(&entry, &grid)).transpose()?;
+        let illuminant = illuminant.filter(|illuminant| *illuminant != Illuminant::default());
+        let under = section.get("under").map(|entry| entry.text().map(str::to_owned)).transpose()?;
+        Ok(Viewing { sensors, response_scale, observer, illuminant, under })
+    }
+
+    /// A set of sensors: a built-in one, or a file.
+    fn sensors(&self, entry: &Entry) -> Result<Sensors, Wrong> {
+        let name = entry.text()?;
+        if let Some(builtin) = Sensors::builtin(name) {
+            return Ok(builtin);
+        }
+        let path = self.folder.join(name);
+        if !path.exists() {
+            return Err(entry.wrong(SceneErrorKind::NoSensors(name.to_owned())));
+        }
+        let table = Table::open(&path, None).map_err(|e| entry.wrong(SceneErrorKind::SensorTable(e)))?;
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        Sensors::from_table(&file, &table).map_err(|e| entry.wrong(e.into()))
+    }
+
+    /// An illuminant: a name, a temperature, or a file of one spectrum.
+    fn illuminant(&self, entry: &Entry, grid: &Grid) -> Result<Illuminant, Wrong> {
+        let name = entry.text()?;
+        match Illuminant::named(name) {
+            Ok(illuminant) => return Ok(illuminant),
+            Err(error @ IlluminantError::Temperature(_)) => {
+                return Err(entry.wrong(SceneErrorKind::Illuminant(error)));
+            }
+            Err(_) => {}
+        }
+        let path = self.folder.join(name);
+        if !path.exists() {
+            return Err(entry.wrong(SceneErrorKind::NoIlluminant(name.to_owned())));
+        }
+        let wrong = |e: DatasetError| entry.wrong(SceneErrorKind::Power(e));
+        let tables = [Table::open(&path, None).map_err(wrong)?];
+        let data = Dataset::new(&tables, grid.clone(), Extrapolation::Error).map_err(wrong)?;
+        let found = data.spectra().ncols();
+        if found != 1 {
+            return Err(entry.wrong(SceneErrorKind::Powers { found }));
+        }
+        // A spline between zeros and a peak may dip below 0, which no light does.
+        Ok(Illuminant::Power(data.spectra().column(0).iter().map(|power| power.max(0.0)).collect()))
     }
 
     fn model(&mut self, entry: &Entry) -> Result<Model, Wrong> {

@@ -1,9 +1,11 @@
 //! Groups of a scene: illuminants, surfaces and targets.
 
+use crate::colorimetry::{Illuminant, Observer};
 use crate::model::Model;
 use crate::program::Bounds;
 use crate::quantity::Quantity;
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, Intensity};
+use crate::sensors::{ResponseScale, Sensors};
 
 /// Settings that groups of all kinds have.
 #[derive(Clone, Debug)]
@@ -15,11 +17,32 @@ pub(super) struct Base {
     pub(super) covariance_scale: f64,
     pub(super) max_attempts: u32,
     pub(super) quantities: Vec<Quantity>,
+    pub(super) viewing: Viewing,
+}
+
+/// Settings of what is seen of a group's spectra.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Viewing {
+    /// Sensors of responses.
+    pub(super) sensors: Option<Sensors>,
+    pub(super) response_scale: Option<ResponseScale>,
+    /// Observer of XYZ, chromaticity, linear sRGB and LRV, where it is not that of 1931.
+    pub(super) observer: Option<Observer>,
+    /// Illuminant of reflectances, where it is not D65.
+    pub(super) illuminant: Option<Illuminant>,
+    /// Name of the group of lights that responses and color signals are under.
+    pub(super) under: Option<String>,
 }
 
 /// The quantities that a group can be asked for.
-pub(super) const QUANTITIES: [Quantity; 4] =
-    [Quantity::Spectra, Quantity::Xyz, Quantity::Chromaticity, Quantity::LinearSrgb];
+pub(super) const QUANTITIES: [Quantity; 6] = [
+    Quantity::Spectra,
+    Quantity::Xyz,
+    Quantity::Chromaticity,
+    Quantity::LinearSrgb,
+    Quantity::Responses,
+    Quantity::ColorSignal,
+];
 
 /// Lights, so many in each scene.
 #[derive(Clone, Debug)]
@@ -161,12 +184,38 @@ macro_rules! base {
                 self
             }
 
-            /// The quantities to give an array each, of spectra, XYZ, chromaticity and linear sRGB
-            /// ([`Quantity::Spectra`]): of reflectances under D65, where a perfect white has Y = 1; of illuminants
+            /// The quantities to give an array each, of spectra, XYZ, chromaticity, linear sRGB, responses and, of
+            /// reflectances, color signals ([`Quantity::Spectra`]): of reflectances under D65 unless
+            /// [`illuminant`](Self::illuminant) says otherwise, where a perfect white has Y = 1; of illuminants
             /// their own ([`XyzScale::Absolute`](crate::XyzScale::Absolute)), intensity included. What else describes
             /// a group, such as its intensities, always comes along.
             pub fn quantities(mut self, quantities: impl IntoIterator<Item = Quantity>) -> Self {
                 self.base.quantities = quantities.into_iter().collect();
+                self
+            }
+
+            /// Sets the sensors of [`Quantity::Responses`].
+            pub fn sensors(mut self, sensors: Sensors) -> Self {
+                self.base.viewing.sensors = Some(sensors);
+                self
+            }
+
+            /// Sets the scale of responses: of reflectances relative to a perfect white, and under the lights of a scene
+            /// absolute, unless set; of illuminants always absolute.
+            pub fn response_scale(mut self, scale: ResponseScale) -> Self {
+                self.base.viewing.response_scale = Some(scale);
+                self
+            }
+
+            /// Sets the observer of XYZ, chromaticity, linear sRGB and luminous reflectance ([`Observer::Cie1931`]).
+            pub fn observer(mut self, observer: Observer) -> Self {
+                self.base.viewing.observer = Some(observer);
+                self
+            }
+
+            /// Sets the illuminant of what is seen of reflectances, and of their targets ([`Illuminant::D65`]).
+            pub fn illuminant(mut self, illuminant: Illuminant) -> Self {
+                self.base.viewing.illuminant = Some(illuminant);
                 self
             }
         }
@@ -211,6 +260,22 @@ impl Illuminants {
         Illuminants { same_shape: true, ..self }
     }
 }
+
+macro_rules! under {
+    ($group:ident) => {
+        impl $group {
+            /// Gives responses and color signals under each of the lights of a group of the same scene: arrays of (light,
+            /// element, sensor) and (light, element, band).
+            pub fn under(mut self, lights: &str) -> Self {
+                self.base.viewing.under = Some(lights.to_owned());
+                self
+            }
+        }
+    };
+}
+
+under!(Surfaces);
+under!(Targets);
 
 impl Surfaces {
     /// `count` reflectances a scene.
@@ -268,6 +333,7 @@ impl Base {
             covariance_scale: 1.0,
             max_attempts: DEFAULT_MAX_ATTEMPTS,
             quantities: vec![Quantity::Spectra],
+            viewing: Viewing::default(),
         }
     }
 

@@ -40,6 +40,7 @@
 mod error;
 mod file;
 mod group;
+mod lighting;
 mod plan;
 mod reader;
 mod sampler;
@@ -106,7 +107,7 @@ impl Scene {
 
     /// The names of the groups.
     pub fn groups(&self) -> impl Iterator<Item = &str> {
-        self.plans.iter().map(|plan| plan.name.as_str())
+        self.plans.iter().filter(|plan| !plan.arrays.is_empty()).map(|plan| plan.name.as_str())
     }
 
     /// Every array, group by group.
@@ -119,10 +120,17 @@ impl Scene {
         self.keep(|name| name == group)
     }
 
-    /// The scene with those of its groups that are wanted, whose draws stay what they are; `None` where none is.
+    /// The scene with those of its groups that are wanted, whose draws stay what they are; `None` where none is. Lights
+    /// that these are seen under are still drawn, but give no arrays.
     pub fn keep(mut self, wanted: impl Fn(&str) -> bool) -> Option<Scene> {
-        self.plans.retain(|plan| wanted(&plan.name));
-        (!self.plans.is_empty()).then_some(self)
+        let kept = |plan: &&GroupPlan| wanted(&plan.name);
+        let lights =
+            self.plans.iter().filter(kept).filter_map(|plan| Some(plan.lighting.as_ref()?.lights.clone()));
+        let lights: Vec<String> = lights.collect();
+        self.plans.retain(|plan| wanted(&plan.name) || lights.contains(&plan.name));
+        let unwanted = self.plans.iter_mut().filter(|plan| !wanted(&plan.name));
+        unwanted.for_each(|plan| plan.arrays.clear());
+        if self.groups().next().is_some() { Some(self) } else { None }
     }
 
     /// The names of the groups that are drawn from a model, with that model: with the group's own mean where it has
@@ -154,7 +162,7 @@ impl SceneBuilder {
         self.checked().map_err(|fault| {
             let group = fault.group.map(|group| self.groups[group].base().name.clone());
             let place = SceneErrorPlace { group, key: fault.key.to_owned(), ..SceneErrorPlace::default() };
-            SceneError::new(place, fault.problem)
+            SceneError::new(place, *fault.problem)
         })
     }
 
@@ -209,9 +217,10 @@ impl SceneBuilder {
             models.next().map(|model| model.grid().clone())
         });
         let grid = grid.unwrap_or(Grid::DEFAULT);
-        let plans = self.groups.iter().enumerate();
-        let plans: Vec<_> =
-            plans.map(|(i, group)| GroupPlan::new(i, group, &grid, self.seed)).collect::<Result<_, _>>()?;
+        let plans = 0..self.groups.len();
+        let mut plans: Vec<_> =
+            plans.map(|i| GroupPlan::new(i, &self.groups, &grid, self.seed)).collect::<Result<_, _>>()?;
+        lighting::plan(&mut plans, &self.groups, &grid)?;
         let names = |plan: &'_ GroupPlan| plan.arrays.iter().map(|a| a.name.clone()).collect::<Vec<_>>();
         for (number, plan) in plans.iter().enumerate() {
             let clash =

@@ -9,10 +9,14 @@ use crate::model::{Model, ModelParts};
 use crate::program::{Bounds, IntensityLaw};
 use crate::quantity::{Dtype, Quantity, ValueRange};
 use crate::random::stream::{self, Stream};
-use crate::recipe::{Intensity, Recipe, RecipeBuilder, RecipeError};
+use crate::recipe::{Intensity, OutputRequest, Recipe, RecipeBuilder, RecipeError};
+use crate::sensors::Sensors;
 
 use super::error::{Fault, SceneErrorKind};
-use super::group::{Base, Group, Illuminants, IntensityScope, QUANTITIES, TargetConstraint, Targets};
+use super::group::{
+    Base, Group, Illuminants, IntensityScope, QUANTITIES, TargetConstraint, Targets, Viewing,
+};
+use super::lighting::Lighting;
 use super::target::{TargetPlan, key};
 
 /// A group as it is drawn.
@@ -30,8 +34,10 @@ pub(super) struct GroupPlan {
     pub(super) intensity: Option<Varying>,
     /// Factor of all its lights, where that is one number.
     pub(super) fixed_intensity: Option<f32>,
-    /// For targets that are asked for what it sees; all others have it from their recipe.
-    pub(super) observer: Option<Observer>,
+    /// For targets that are asked for what is seen of them; all others have it from their recipe.
+    pub(super) eye: Option<Eye>,
+    /// For what is seen under the lights of the scene.
+    pub(super) lighting: Option<Lighting>,
     pub(super) arrays: Vec<Array>,
 }
 
@@ -57,15 +63,38 @@ pub(super) enum Shapes {
     Target(Box<TargetPlan>),
 }
 
-/// The weights of the bands in X, Y and Z under D65.
-pub(super) struct Observer([Vec<f64>; 3]);
+/// Weights of the bands in what is seen of a reflectance.
+pub(super) struct Eye {
+    xyz: Option<[Vec<f64>; 3]>,
+    /// Of each sensor; none where there are no responses.
+    responses: Vec<Vec<f64>>,
+}
 
-impl Observer {
-    /// A quantity that tristimulus values give, of a reflectance: summed in f64, since targets are drawn on the CPU
-    /// whatever the engine.
+impl Eye {
+    /// The eye of a group of targets; `None` where nothing of them is seen.
+    fn new(base: &Base, grid: &Grid) -> Result<Option<Eye>, RecipeError> {
+        let viewing = &base.viewing;
+        let request = OutputRequest {
+            illuminant: viewing.illuminant.clone(),
+            observer: viewing.observer,
+            response_scale: viewing.response_scale,
+            ..OutputRequest::default()
+        };
+        let has_colours = Quantity::COLOURS.iter().any(|quantity| base.wants(*quantity));
+        let xyz = has_colours.then(|| request.reflected_xyz_weights(grid)).transpose()?;
+        let own = viewing.sensors.as_ref().filter(|_| viewing.under.is_none());
+        let weights = own.map(|sensors| request.response_weights(sensors, SpectrumKind::Reflectance, grid));
+        let responses = weights.transpose()?.unwrap_or_default();
+        Ok((xyz.is_some() || !responses.is_empty()).then_some(Eye { xyz, responses }))
+    }
+
+    /// A quantity of a reflectance that is seen: summed in f64, since targets are drawn on the CPU whatever the engine.
     pub(super) fn see(&self, spectrum: &[f32], quantity: Quantity) -> Vec<f32> {
         let dot = |w: &Vec<f64>| w.iter().zip(spectrum).map(|(w, &s)| w * f64::from(s)).sum::<f64>();
-        let xyz = self.0.each_ref().map(dot);
+        if quantity == Quantity::Responses {
+            return self.responses.iter().map(|weights| dot(weights) as f32).collect();
+        }
+        let xyz = self.xyz.as_ref().expect("colours are asked for").each_ref().map(dot);
         let [x, y, z] = xyz;
         match quantity {
             Quantity::Xyz => xyz.map(|v| v as f32).to_vec(),
@@ -103,8 +132,15 @@ pub struct Array {
     pub quantity: Quantity,
     /// Whether it has an entry for each scene, rather than one for all.
     pub per_scene: bool,
-    /// The extents of an entry. Spectra have (count, bands), and other quantities one of them or none.
+    /// The extents of an entry. Spectra have (count, bands), and other quantities one of them or none; what is seen under
+    /// the lights of the scene has the number of lights before these.
     pub shape: Vec<usize>,
+    /// The group of lights that it is seen under.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub under: Option<String>,
+    /// Names of the values along the last axis, where each has one of its own.
+    #[serde(skip)]
+    pub channels: Vec<String>,
     /// Range of its values, if they are spectra.
     #[serde(skip)]
     pub range: Option<ValueRange>,
@@ -149,8 +185,9 @@ impl Varying {
 }
 
 impl GroupPlan {
-    /// Finds out how to draw group `number` of a scene.
-    pub(super) fn new(number: usize, group: &Group, grid: &Grid, seed: u64) -> Result<GroupPlan, Fault> {
+    /// Finds out how to draw group `number` of a scene, among `groups`.
+    pub(super) fn new(number: usize, groups: &[Group], grid: &Grid, seed: u64) -> Result<GroupPlan, Fault> {
+        let group = &groups[number];
         let base = group.base();
         let fault = |key, problem| Fault::of_group(number, key, problem);
         let count = u32::try_from(base.count).expect("the count was checked");
@@ -169,16 +206,18 @@ impl GroupPlan {
         if let Some(other) = base.quantities.iter().find(|quantity| !QUANTITIES.contains(quantity)) {
             return Err(fault("quantities", SceneErrorKind::NotOfGroups { quantity: *other }));
         }
-        let mut observer = None;
+        check_viewing(group).map_err(|(k, p)| fault(k, p))?;
+        let seen = Seen::of(base, groups);
+        let mut eye = None;
         let (kind, shapes, intensity) = match group {
             Group::Illuminants(group) => {
-                let (drawing, intensity) = illuminants(group).map_err(|(k, p)| fault(k, p))?;
+                let (drawing, intensity) = illuminants(group, seen).map_err(|(k, p)| fault(k, p))?;
                 let shapes = if group.fixed { Shapes::Once(drawing) } else { Shapes::Engine(drawing) };
                 (GroupKind::Illuminant, shapes, intensity)
             }
             Group::Surfaces(group) => {
                 let model = of_kind(base, SpectrumKind::Reflectance).map_err(|(k, p)| fault(k, p))?;
-                let recipe = recipe(base, model, group.fixed);
+                let recipe = recipe(base, model, (group.fixed, seen));
                 let recipe = recipe.build().map_err(|e| fault(key(&e), SceneErrorKind::Recipe(e)))?;
                 let drawing = Box::new(Drawing { recipe, places: count });
                 let shapes = if group.fixed { Shapes::Once(drawing) } else { Shapes::Engine(drawing) };
@@ -186,11 +225,7 @@ impl GroupPlan {
             }
             Group::Targets(group) => {
                 let target = TargetPlan::new(group, grid.len(), stream).map_err(|(k, p)| fault(k, p))?;
-                if base.quantities.iter().any(|quantity| Quantity::COLOURS.contains(quantity)) {
-                    let invisible = || SceneErrorKind::Recipe(RecipeError::Invisible(grid.clone()));
-                    let weights = colorimetry::xyz_weights(grid);
-                    observer = Some(Observer(weights.ok_or_else(|| fault("wavelengths", invisible()))?));
-                }
+                eye = Eye::new(base, grid).map_err(|e| fault(key(&e), SceneErrorKind::Recipe(e)))?;
                 (GroupKind::Target, Shapes::Target(Box::new(target)), None)
             }
         };
@@ -205,7 +240,9 @@ impl GroupPlan {
             (None, Some(_)) => Intensities::Fixed,
             (None, None) => Intensities::None,
         };
-        let arrays = arrays(group, &shapes, intensities, grid.len());
+        let lights = lights_of(base, groups).map_err(|(k, p)| fault(k, p))?;
+        let lights = lights.map(|lights| groups[lights].base());
+        let arrays = arrays(group, &shapes, (intensities, lights), grid.len());
         let model = match &shapes {
             Shapes::Engine(drawing) | Shapes::Once(drawing) => Some(drawing.recipe.model().clone()),
             Shapes::Target(_) => base.model.clone(),
@@ -221,7 +258,8 @@ impl GroupPlan {
             shapes,
             intensity,
             fixed_intensity,
-            observer,
+            eye,
+            lighting: None, // once all groups have a plan
             arrays,
         })
     }
@@ -254,13 +292,99 @@ impl GroupPlan {
     }
 }
 
+/// Quantities of a group that others of its scene, or what is seen under lights, are made of.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    weights: bool,
+    spectra: bool,
+}
+
+impl Seen {
+    fn of(base: &Base, groups: &[Group]) -> Seen {
+        // Those that are seen under this group, and the group itself where it is seen under another.
+        let is_under = |other: &&Base| other.viewing.under.as_ref() == Some(&base.name);
+        let own = std::iter::once(base).filter(|base| base.viewing.under.is_some());
+        let all: Vec<&Base> = groups.iter().map(Group::base).filter(is_under).chain(own).collect();
+        Seen {
+            weights: all.iter().any(|base| base.wants(Quantity::Responses)),
+            spectra: all.iter().any(|base| base.wants(Quantity::ColorSignal)),
+        }
+    }
+}
+
 /// The recipe of what the group gives. What is drawn once has its spectra all the same: a renderer takes them.
-fn recipe(base: &Base, model: &Model, once: bool) -> RecipeBuilder {
-    let spectra = once.then_some(Quantity::Spectra);
-    Recipe::builder(model)
+fn recipe(base: &Base, model: &Model, (once, seen): (bool, Seen)) -> RecipeBuilder {
+    let spectra = (once || seen.spectra).then_some(Quantity::Spectra);
+    let weights = seen.weights.then_some(Quantity::Weights);
+    let is_own = |quantity: &Quantity| match quantity {
+        Quantity::Responses => base.viewing.under.is_none(),
+        Quantity::ColorSignal => false,
+        _ => true,
+    };
+    let own: Vec<Quantity> =
+        base.quantities.iter().copied().filter(is_own).chain(spectra).chain(weights).collect();
+    let builder = Recipe::builder(model)
         .covariance_scale(base.covariance_scale)
         .max_attempts(base.max_attempts)
-        .quantities(base.quantities.iter().copied().chain(spectra))
+        .quantities(own);
+    viewed(builder, &base.viewing)
+}
+
+/// The recipe with the settings of what is seen of it; those under lights are none of a recipe's.
+pub(super) fn viewed(mut builder: RecipeBuilder, viewing: &Viewing) -> RecipeBuilder {
+    if let Some(observer) = viewing.observer {
+        builder = builder.observer(observer);
+    }
+    if let Some(illuminant) = &viewing.illuminant {
+        builder = builder.illuminant(illuminant.clone());
+    }
+    if viewing.under.is_none() {
+        if let Some(sensors) = &viewing.sensors {
+            builder = builder.sensors(sensors.clone());
+        }
+        if let Some(scale) = viewing.response_scale {
+            builder = builder.response_scale(scale);
+        }
+    }
+    builder
+}
+
+/// Refuses settings of what is seen that lack another, or mean nothing.
+fn check_viewing(group: &Group) -> Result<(), (&'static str, SceneErrorKind)> {
+    let (base, Viewing { sensors, response_scale, under, .. }) = (group.base(), &group.base().viewing);
+    let has_responses = base.wants(Quantity::Responses);
+    let missing = |key, example| Err((key, SceneErrorKind::Missing { example }));
+    let pointless = |key, with| Err((key, SceneErrorKind::Pointless { with }));
+    if has_responses && sensors.is_none() {
+        return missing("sensors", "sensors = \"ss2\", or a file, for the responses");
+    }
+    if base.wants(Quantity::ColorSignal) && under.is_none() {
+        return missing("under", "under = \"lights\", the name of the lights of the color signals");
+    }
+    if sensors.is_some() && !has_responses {
+        return pointless("sensors", "without \"responses\" among the quantities");
+    }
+    if response_scale.is_some() && !has_responses {
+        return pointless("response_scale", "without \"responses\" among the quantities");
+    }
+    if under.is_some() && matches!(group, Group::Illuminants(_)) {
+        return pointless("under", "for lights");
+    }
+    if under.is_some() && !has_responses && !base.wants(Quantity::ColorSignal) {
+        return pointless("under", "without \"responses\" or \"color_signal\" among the quantities");
+    }
+    Ok(())
+}
+
+/// The number of the group of lights that a group is seen under.
+fn lights_of(base: &Base, groups: &[Group]) -> Result<Option<usize>, (&'static str, SceneErrorKind)> {
+    let Some(under) = &base.viewing.under else { return Ok(None) };
+    let is_meant = |group: &Group| matches!(group, Group::Illuminants(_)) && group.base().name == *under;
+    groups.iter().position(is_meant).map(Some).ok_or_else(|| {
+        let lights = groups.iter().filter(|group| matches!(group, Group::Illuminants(_)));
+        let known = lights.map(|group| group.base().name.clone()).collect();
+        ("under", SceneErrorKind::NoLights { name: under.clone(), known })
+    })
 }
 
 fn of_kind(base: &Base, wanted: SpectrumKind) -> Result<&Model, (&'static str, SceneErrorKind)> {
@@ -273,14 +397,14 @@ fn of_kind(base: &Base, wanted: SpectrumKind) -> Result<&Model, (&'static str, S
 
 type Lights = (Box<Drawing>, Option<Varying>);
 
-fn illuminants(group: &Illuminants) -> Result<Lights, (&'static str, SceneErrorKind)> {
+fn illuminants(group: &Illuminants, seen: Seen) -> Result<Lights, (&'static str, SceneErrorKind)> {
     let model = of_kind(&group.base, SpectrumKind::Illuminant)?;
     let model = match &group.mean {
         Some(mean) => with_mean(model, mean).map_err(|problem| ("mean", problem))?,
         None => model.clone(),
     };
     let failed = |e: RecipeError| (key(&e), SceneErrorKind::Recipe(e));
-    let mut recipe = recipe(&group.base, &model, group.fixed);
+    let mut recipe = recipe(&group.base, &model, (group.fixed, seen));
     let mut varying = None;
     match group.intensity {
         None => {}
@@ -321,7 +445,7 @@ fn with_mean(model: &Model, mean: &[f64]) -> Result<Model, SceneErrorKind> {
 
 /// Whether an intensity multiplies a quantity of lights.
 pub(super) fn is_multiplied(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Spectra | Quantity::Xyz | Quantity::LinearSrgb)
+    matches!(quantity, Quantity::Spectra | Quantity::Xyz | Quantity::LinearSrgb | Quantity::Responses)
 }
 
 /// Intensities of a group.
@@ -333,7 +457,12 @@ enum Intensities {
     Varying(IntensityScope),
 }
 
-fn arrays(group: &Group, shapes: &Shapes, intensities: Intensities, bands: usize) -> Vec<Array> {
+fn arrays(
+    group: &Group,
+    shapes: &Shapes,
+    (intensities, lights): (Intensities, Option<&Base>),
+    bands: usize,
+) -> Vec<Array> {
     let base = group.base();
     let count = base.count as usize;
     let once = matches!(shapes, Shapes::Once(_));
@@ -357,6 +486,8 @@ fn arrays(group: &Group, shapes: &Shapes, intensities: Intensities, bands: usize
         quantity,
         per_scene,
         shape: shape.to_vec(),
+        under: None,
+        channels: quantity.channels().iter().map(|&name| name.to_owned()).collect(),
         range: (quantity == Quantity::Spectra).then_some(range),
     };
     let mut arrays = Vec::new();
@@ -386,6 +517,20 @@ fn arrays(group: &Group, shapes: &Shapes, intensities: Intensities, bands: usize
             let scales = varies && is_multiplied(quantity);
             arrays.push(array(quantity, !once || scales, &[count, quantity.channels().len()]));
         }
+    }
+    let channels: Vec<String> = base.viewing.sensors.iter().flat_map(Sensors::channels).cloned().collect();
+    if base.wants(Quantity::Responses) {
+        let per_scene = lights.is_some() || !once || varies;
+        let shape: Vec<usize> =
+            lights.iter().map(|lights| lights.count as usize).chain([count, channels.len()]).collect();
+        let under = lights.map(|lights| lights.name.clone());
+        arrays.push(Array { under, channels, ..array(Quantity::Responses, per_scene, &shape) });
+    }
+    if let Some(lights) = lights.filter(|_| base.wants(Quantity::ColorSignal)) {
+        let under = Some(lights.name.clone());
+        let range = Some(ValueRange::Positive);
+        let shape = [lights.count as usize, count, bands];
+        arrays.push(Array { under, range, ..array(Quantity::ColorSignal, true, &shape) });
     }
     if !flat {
         arrays.push(array(Quantity::Attempts, !once, &[count]));

@@ -187,14 +187,16 @@ impl SceneSession<'_> {
             let part = next..next + count;
             next = part.end;
             let mut batches = batches.iter();
-            let mut arrays = Vec::new();
+            let mut all = Vec::new();
             for ((plan, once), summary) in scene.plans.iter().zip(once).zip(&mut summaries) {
                 let drawing = plan.drawn_by_engine();
                 let batch = drawing.and_then(|drawing| batches.next().map(|batch| (drawing, batch)));
                 let (once, scenes) = (once.as_ref(), (first, part.clone()));
-                let columns = pool.install(|| columns(plan, once, batch, scenes, &mut summary.summary))?;
-                arrays.extend(columns.arrays(plan));
+                all.push(pool.install(|| columns(plan, once, batch, scenes, &mut summary.summary))?);
             }
+            pool.install(|| light(scene, once, &mut all, count as usize));
+            let arrays =
+                scene.plans.iter().zip(all).flat_map(|(plan, columns)| columns.arrays(plan)).collect();
             sink(Window { scenes: part, arrays })
         };
         match &mut self.schedule {
@@ -269,19 +271,19 @@ pub(super) fn columns<'a>(
                 own.for_each(|(_, statuses)| summary.count(statuses));
             }
             let values = |quantity| -> Vec<f32> {
-                match (quantity, &plan.observer) {
+                match (quantity, &plan.eye) {
                     (Quantity::Spectra, _) => drawn.iter().flat_map(|d| &d.spectrum).copied().collect(),
                     (Quantity::Lrv, _) => drawn.iter().map(|d| d.lrv).collect(),
                     (Quantity::Xyz, _) if drawn.iter().all(|d| d.xyz.is_some()) => {
                         drawn.iter().filter_map(|d| d.xyz).flatten().collect()
                     }
-                    (seen, Some(observer)) => {
-                        drawn.par_iter().flat_map_iter(|d| observer.see(&d.spectrum, seen)).collect()
+                    (seen, Some(eye)) => {
+                        drawn.par_iter().flat_map_iter(|d| eye.see(&d.spectrum, seen)).collect()
                     }
                     (other, None) => unreachable!("targets have no {other}"),
                 }
             };
-            let given = plan.arrays.iter().map(|array| array.quantity);
+            let given = plan.arrays.iter().filter(|array| array.under.is_none()).map(|array| array.quantity);
             // A renderer takes the spectra, even where no array has them.
             let wanted = given.filter(|quantity| !matches!(quantity, Quantity::Attempts | Quantity::Spectra));
             let wanted = std::iter::once(Quantity::Spectra).chain(wanted);
@@ -309,6 +311,23 @@ pub(super) fn columns<'a>(
         columns.values.push((Quantity::Intensity, levels.into()));
     }
     Ok(columns)
+}
+
+/// Adds what is seen under lights to the columns of all groups.
+fn light(scene: &Scene, once: &[Option<SharedSpectra>], columns: &mut [Columns], scenes: usize) {
+    for (number, plan) in scene.plans.iter().enumerate() {
+        let Some(lighting) = &plan.lighting else { continue };
+        let lights = scene.plans.iter().position(|plan| plan.name == lighting.lights);
+        let lights = lights.expect("lights are kept with what is seen under them");
+        // Out of the list, so that the other is free.
+        let mut own = std::mem::take(&mut columns[number]);
+        lighting.add(
+            (plan, &mut own, once[number].as_ref()),
+            (&scene.plans[lights], &columns[lights], once[lights].as_ref()),
+            scenes,
+        );
+        columns[number] = own;
+    }
 }
 
 /// Values in rows of `width`, each row so many times.
@@ -342,6 +361,23 @@ impl<'a> Columns<'a> {
 
     pub(super) fn of(&self, quantity: Quantity) -> &[f32] {
         values_of(&self.values, quantity)
+    }
+
+    /// The values of a quantity, and whether they are those that all scenes share.
+    pub(super) fn or_shared<'c>(
+        &'c self,
+        once: Option<&'c SharedSpectra>,
+        quantity: Quantity,
+    ) -> (&'c [f32], bool) {
+        match (self.of(quantity), once) {
+            ([], Some(once)) => (once.of(quantity), true),
+            (values, _) => (values, false),
+        }
+    }
+
+    /// Adds a quantity.
+    pub(super) fn push(&mut self, quantity: Quantity, values: Vec<f32>) {
+        self.values.push((quantity, values.into()));
     }
 
     /// The values of f32 besides spectra.

@@ -13,7 +13,8 @@ use crate::random::stream::{self, Stream};
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, ProposalKind, Recipe, RecipeBuilder, RecipeError};
 
 use super::error::SceneErrorKind;
-use super::group::{Copies, Hue, LrvLevels, TargetConstraint, Targets};
+use super::group::{Copies, Hue, LrvLevels, TargetConstraint, Targets, Viewing};
+use super::plan::viewed;
 
 /// Method of drawing targets.
 pub(super) enum TargetPlan {
@@ -62,6 +63,9 @@ impl TargetPlan {
         let builder = Recipe::builder(model)
             .covariance_scale(targets.base.covariance_scale)
             .max_attempts(targets.base.max_attempts);
+        // What is seen of a target is no matter of its recipe, but what it is aimed at.
+        let aimed = Viewing { sensors: None, response_scale: None, ..targets.base.viewing.clone() };
+        let builder = viewed(builder, &aimed);
         let built = |recipe: Result<Recipe, RecipeError>| recipe.map_err(|e| because_of(&targets.aim, e));
         match &targets.aim {
             TargetConstraint::Lrv(levels) => {
@@ -186,7 +190,7 @@ impl TargetPlan {
                 let level = number(hue.levels as usize) as u32;
                 let xyz =
                     hue.xyz(level, between(hue.saturation, uniform(0)), between(hue.lightness, uniform(1)));
-                let spectrum = condition.given(xyz, spectrum);
+                let spectrum = condition.given(&xyz, spectrum);
                 let kernel = Kernel::new(&Program { spectrum, ..(**program).clone() });
                 DrawnTarget { xyz: Some(xyz.map(|v| v as f32)), ..drawn(&kernel, stream, at(scene), xyz[1]) }
             }
@@ -346,6 +350,13 @@ pub(super) fn key(error: &RecipeError) -> &'static str {
         RecipeError::CovarianceScale(_) => "cov_scale",
         RecipeError::MaxAttempts(_) => "max_attempts",
         RecipeError::Invisible(_) => "wavelengths",
+        RecipeError::Sensors(_) => "sensors",
+        RecipeError::Illuminant(_) | RecipeError::DarkLight | RecipeError::Light { .. } => "illuminant",
+        RecipeError::Pointless { setting: "an illuminant for reflectances", .. } => "illuminant",
+        RecipeError::Pointless { setting: "an observer", .. } => "observer",
+        RecipeError::Pointless { setting, .. } if setting.starts_with("a scale of responses") => {
+            "response_scale"
+        }
         _ => "",
     }
 }

@@ -95,9 +95,10 @@ fn unrolled(program: &Program, form: Arithmetic) -> Text {
     let (n, k) = (program.bands(), program.components());
     let mut text = Text::default();
     text.line(&format!("alias Normals = array<f32, {k}>;"));
+    given(&mut text, program.given);
     match &program.proposal {
         Some(proposal) => text.line(&proposal.rounded::<f32>().text(k)),
-        None => normals(&mut text, k),
+        None => normals(&mut text, program.given, program.normals()),
     }
     text.line("");
     forms(&mut text, "band", &program.spectrum);
@@ -125,9 +126,20 @@ fn unrolled(program: &Program, form: Arithmetic) -> Text {
     text
 }
 
-fn normals(text: &mut Text, k: usize) {
+/// Declares the responses that are given to each draw, where there are any.
+fn given(text: &mut Text, given: usize) {
+    if given > 0 {
+        text.line(&format!("alias Given = array<f32, {given}>;"));
+    }
+}
+
+/// Writes the function that makes normals, which follow the responses that are given.
+fn normals(text: &mut Text, given: usize, k: usize) {
+    let parameter = if given > 0 { ", given: Given" } else { "" };
     text.block(
-        "fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Normals",
+        &format!(
+            "fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32{parameter}) -> Normals"
+        ),
         |body| {
             for block in 0..k.div_ceil(4) {
                 body.line(&format!("let w{block} = philox(vec4(index, attempt, stream | {block}u), key);"));
@@ -136,8 +148,9 @@ fn normals(text: &mut Text, k: usize) {
                 let [x, y] = if pair % 2 == 0 { ["x", "y"] } else { ["z", "w"] };
                 body.line(&format!("let p{pair} = normal_pair(w{0}.{x}, w{0}.{y});", pair / 2));
             }
-            let normal = |j| format!("p{}.{}", j / 2, if j % 2 == 0 { "x" } else { "y" });
-            body.line(&format!("return Normals({});", list(k, normal)));
+            let normal = |j: usize| format!("p{}.{}", j / 2, if j.is_multiple_of(2) { "x" } else { "y" });
+            let input = |i: usize| if i < given { format!("given[{i}]") } else { normal(i - given) };
+            body.line(&format!("return Normals({});", list(given + k, input)));
         },
     );
 }
@@ -171,15 +184,32 @@ pub(super) fn tiles(components: usize) -> usize {
     if components > TILE { components / TILE } else { 0 }
 }
 
+/// The fragment `normals_looped.wgsl`, whose normals follow the responses that are given.
+fn after_given(normals: &str, given: usize) -> String {
+    if given == 0 {
+        return normals.to_owned();
+    }
+    let copies: String = (0..given).map(|i| format!("    z[{i}] = given[{i}];\n")).collect();
+    normals
+        .replace("attempt: u32)", "attempt: u32, given: Given)")
+        .replace("    var z: Normals;\n", &format!("    var z: Normals;\n{copies}"))
+        .replace("z[4u * block", &format!("z[{given}u + 4u * block"))
+}
+
 /// The fragment `arithmetic_looped.wgsl` with the program's constants.
 fn looped(program: &Program, tables: &Tables) -> Text {
     let (n, k) = (program.bands(), program.components());
     let mut text = Text::default();
-    for (name, value) in [("BANDS", n), ("BLOCKS", k.div_ceil(4))] {
+    for (name, value) in [("BANDS", n), ("BLOCKS", program.normals().div_ceil(4))] {
         text.line(&format!("const {name} = {value}u;"));
     }
     text.line("");
-    text.0 += LOOPED;
+    let first = program.given;
+    text.0 += &match first {
+        0 => LOOPED.to_owned(),
+        _ => LOOPED.replace("array<f32, 4u * BLOCKS>", &format!("array<f32, {first}u + 4u * BLOCKS>")),
+    };
+    given(&mut text, first);
     text.line("\n// A row of the model: a band, or a value of another quantity.");
     text.line("fn form(z: ptr<function, Normals>, row: u32) -> f32 {");
     text.line(&format!("    let start = row * {}u;", k + 1));
@@ -201,7 +231,7 @@ fn looped(program: &Program, tables: &Tables) -> Text {
     text.line("    return s;\n}\n");
     match &program.proposal {
         Some(proposal) => text.0 += &proposal.rounded::<f32>().text(4 * k.div_ceil(4)),
-        None => text.0 += NORMALS,
+        None => text.0 += &after_given(NORMALS, first),
     }
     if program.target.is_some() {
         text.line("");

@@ -4,8 +4,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{
-    Arithmetic, COVER_AT, Dialect, INDICES_AT, Indexing, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT, TABLES_AT,
-    WORKGROUP, WgslError, attempts_per_dispatch, draws_per_thread, is_sliced, shader_of,
+    Arithmetic, COVER_AT, Dialect, GIVEN_AT, INDICES_AT, Indexing, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT,
+    TABLES_AT, WORKGROUP, WgslError, attempts_per_dispatch, draws_per_thread, is_sliced, shader_of,
 };
 use crate::program::Program;
 use crate::quantity::{ArrayFormat, Quantity};
@@ -39,6 +39,8 @@ pub enum BindingRole {
     Progress,
     /// Indices of the draws, two words each, low and high, in a storage buffer that is read.
     Indices,
+    /// Responses that the draws are given, f32, draw by draw, in a storage buffer that is read.
+    Given,
     /// Values of a quantity, in a storage buffer that is written.
     Output(Quantity),
 }
@@ -71,6 +73,8 @@ pub struct ComputeShader {
     /// Number of candidates of a draw that one dispatch tries.
     slice: u32,
     draws_per_thread: u32,
+    /// Number of responses that each draw is given.
+    given: usize,
 }
 
 /// Uniform that the shader declares as `Parameters`.
@@ -119,6 +123,7 @@ impl ComputeShader {
             (COVER_AT, BindingRole::Cover, program.proposal.is_some()),
             (PROGRESS_AT, BindingRole::Progress, is_sliced(program, variant.dialect)),
             (INDICES_AT, BindingRole::Indices, variant.indexing == Indexing::List),
+            (GIVEN_AT, BindingRole::Given, program.given > 0),
         ];
         let others = others.into_iter().filter(|(.., is_there)| *is_there);
         let outputs = formats.iter().map(|format| format.quantity);
@@ -138,6 +143,7 @@ impl ComputeShader {
             max_attempts: program.max_attempts,
             slice,
             draws_per_thread: draws_per_thread(program, variant.dialect),
+            given: program.given,
         })
     }
 
@@ -170,6 +176,7 @@ impl ComputeShader {
             BindingRole::Cover => self.cover.len() as u64,
             BindingRole::Progress => 4 * capacity,
             BindingRole::Indices => INDEX_BYTES * capacity,
+            BindingRole::Given => size_of::<f32>() as u64 * self.given as u64 * capacity,
             BindingRole::Output(quantity) => {
                 let format = self.formats.iter().find(|format| format.quantity == quantity);
                 format.map_or(0, |format| format.bytes(capacity).next_multiple_of(4))
@@ -227,6 +234,11 @@ impl ComputeShader {
     /// Number of candidates of a draw that one dispatch tries.
     pub(crate) fn slice(&self) -> u32 {
         self.slice
+    }
+
+    /// Number of responses that each draw is given.
+    pub(crate) fn given(&self) -> usize {
+        self.given
     }
 
     pub(crate) fn max_attempts(&self) -> u32 {

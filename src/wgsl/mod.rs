@@ -44,7 +44,7 @@ pub(crate) use shader::{attempts_per_dispatch, is_sliced, shader, shader_of};
 
 use serde::{Deserialize, Serialize};
 
-use crate::program::Program;
+use crate::program::{Output, Program};
 use crate::quantity::{Dtype, Quantity};
 
 /// Threads a workgroup.
@@ -67,6 +67,9 @@ pub(crate) const PROGRESS_AT: u32 = COVER_AT + 1;
 
 /// The binding of the indices of draws, where these are given in a list.
 pub(crate) const INDICES_AT: u32 = PROGRESS_AT + 1;
+
+/// The binding of the responses that draws are given.
+pub(crate) const GIVEN_AT: u32 = INDICES_AT + 1;
 
 /// The most gains (bands x components) that are written out as constants. At this size lavapipe takes 2.5 s to
 /// compile the straight lines, which then run 7 times as fast as the loop: they pay from 2e5 draws on.
@@ -127,7 +130,9 @@ pub(crate) enum Form {
 
 impl Form {
     pub(crate) fn of(program: &Program) -> Form {
-        match program.bands() * program.components() {
+        let is_of_sensors = |output: &&Output| output.format.quantity == Quantity::Responses;
+        let responses = program.outputs.iter().find(is_of_sensors).map_or(0, |output| output.format.width);
+        match (program.bands() + responses) * program.components() {
             ..=UNROLLED_GAINS => Form::Unrolled,
             _ => Form::Looped,
         }
@@ -155,7 +160,7 @@ mod tests {
     use crate::affine::Affine;
     use crate::dataset::SpectrumKind;
     use crate::grid::Grid;
-    use crate::program::{self, Bounds, IntensityLaw, LrvLaw, Output, Source, Unit};
+    use crate::program::{self, Bounds, IntensityLaw, LrvLaw, Source, Unit};
     use crate::quantity::{ArrayFormat, Layout};
 
     /// A program of 3 bands and 2 components, small enough to read.
@@ -178,8 +183,17 @@ mod tests {
         };
         let outputs = vec![Output { format: ArrayFormat::spectra(bands), source: Source::Spectrum }];
         let target = target.map(|(lrv, bounds)| program::LrvTarget { lrv, weights, bounds });
-        Program { kind, spectrum, target, intensity: None, proposal: None, max_attempts: 100, outputs }
-            .with_status()
+        Program {
+            kind,
+            spectrum,
+            target,
+            intensity: None,
+            proposal: None,
+            max_attempts: 100,
+            outputs,
+            given: 0,
+        }
+        .with_status()
     }
 
     /// The program with all that can come out of it, so laid.

@@ -83,16 +83,22 @@ pub(crate) fn module(
     let dialect = (Dialect::Baseline, options.arithmetic);
     let draw = functions(program, &tables, dialect, (false, is_exact), None);
     // What naga_oil imports may name structures, but no other types.
-    let k = program.components();
-    let (alias, normals) = match Form::of(program) {
-        Form::Unrolled => (format!("array<f32, {k}>"), format!("array<f32, {k}>")),
-        Form::Looped => ("array<f32, 4u * BLOCKS>".to_owned(), format!("array<f32, {}>", 4 * k.div_ceil(4))),
+    let normals = match Form::of(program) {
+        Form::Unrolled => program.components(),
+        Form::Looped => program.given + 4 * program.normals().div_ceil(4),
     };
-    let draw = draw.replace(&format!("alias Normals = {alias};\n"), "").replace("Normals", &normals);
+    let draw = without_alias(&draw, "Given", program.given);
+    let draw = without_alias(&draw, "Normals", normals);
     let storage = storage(program, tables.values.len(), options.tables)?;
     let interface = interface(program, &tables, grid, is_exact);
     let text = written(&format!("{storage}{draw}\n{interface}"), options.arithmetic, Zero::Argument);
     Ok(prefixed(&text, prefix))
+}
+
+/// Takes the alias of an array away, whose name then stands nowhere.
+fn without_alias(text: &str, name: &str, count: usize) -> String {
+    let lines = text.lines().filter(|line| !line.starts_with(&format!("alias {name} = ")));
+    lines.map(|line| line.replace(name, &format!("array<f32, {count}>")) + "\n").collect()
 }
 
 /// Writes the tables, and the functions that read them; nothing where there are none.
@@ -138,7 +144,6 @@ fn storage(program: &Program, numbers: usize, storage: Option<TableStorage>) -> 
 
 /// Writes the functions that a host calls, and the constants of the grid.
 fn interface(program: &Program, tables: &Tables, grid: &Grid, is_exact: bool) -> String {
-    let attempts = program.max_attempts;
     let mut text = Text::default();
     if Form::of(program) == Form::Unrolled {
         text.line(&format!("const BANDS = {}u;", program.bands()));
@@ -147,17 +152,7 @@ fn interface(program: &Program, tables: &Tables, grid: &Grid, is_exact: bool) ->
     if let Some(step) = grid.step() {
         text.line(&format!("const STEP_NM = {};", float(step)));
     }
-    text.line("\n// Draw `index` (low word, high word) under a seed (low word, high word), as every engine makes it.");
-    if is_exact {
-        text.line("// `zero` must be 0 and known at run time alone, as from a uniform, or compilers see through it.");
-    }
-    text.0 += "fn draw(seed: vec2<u32>, index: vec2<u32>) -> Draw {\n";
-    text.line(&format!("    return draw_of(seed, index, 0u, {attempts}u);\n}}\n"));
-    text.line(
-        "// The same, of the stream of this number, which sets draws apart from others of the same seed.",
-    );
-    text.0 += "fn draw_in(stream: u32, seed: vec2<u32>, index: vec2<u32>) -> Draw {\n";
-    text.line(&format!("    return draw_of(seed, index, stream << 8u, {attempts}u);\n}}"));
+    draw(&mut text, program, is_exact);
     for (i, output) in program.outputs.iter().enumerate() {
         let quantity = output.format.quantity;
         match &output.source {
@@ -182,6 +177,43 @@ fn interface(program: &Program, tables: &Tables, grid: &Grid, is_exact: bool) ->
         }
     }
     text.0
+}
+
+/// Writes the functions that make a draw of an index, and of the responses that it is given: a vector of two to four of
+/// them, so that a texel goes in as it is.
+fn draw(text: &mut Text, program: &Program, is_exact: bool) {
+    let (attempts, given) = (program.max_attempts, program.given);
+    let (kind, parts) = match given {
+        0 | 1 => ("f32".to_owned(), "c".to_owned()),
+        2..=4 => (format!("vec{given}<f32>"), list(given, |i| format!("c.{}", ["x", "y", "z", "w"][i]))),
+        _ => (format!("array<f32, {given}>"), list(given, |i| format!("c[{i}]"))),
+    };
+    let (name, condition, parameter, argument) = match given {
+        0 => ("draw", "", String::new(), String::new()),
+        _ => {
+            let argument = format!(", array<f32, {given}>({parts})");
+            ("draw_given", ", given the responses c", format!(", c: {kind}"), argument)
+        }
+    };
+    let mut function = |notes: &[&str], head: &str, stream: &str| {
+        notes.iter().for_each(|note| text.line(note));
+        text.line(&format!("fn {head}, index: vec2<u32>{parameter}) -> Draw {{"));
+        text.line(&format!("    return draw_of(seed, index, {stream}, {attempts}u{argument});\n}}"));
+    };
+    let words = "(low word, high word)";
+    let first =
+        format!("\n// Draw `index` {words} under a seed {words}{condition}, as every engine makes it.");
+    let zero =
+        "// `zero` must be 0 and known at run time alone, as from a uniform, or compilers see through it.";
+    let notes = [first.as_str(), zero];
+    function(&notes[..1 + usize::from(is_exact)], &format!("{name}(seed: vec2<u32>"), "0u");
+    function(
+        &[
+            "\n// The same, of the stream of this number, which sets draws apart from others of the same seed.",
+        ],
+        &format!("{name}_in(stream: u32, seed: vec2<u32>"),
+        "stream << 8u",
+    );
 }
 
 /// Writes the function of a quantity that is a map of the normals: of each value, and of what all are divided by.

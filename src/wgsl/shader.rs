@@ -3,9 +3,10 @@
 use super::arithmetic::{self, arithmetic};
 use super::guards::{Zero, written};
 use super::store::store;
+use super::writer::list;
 use super::{
-    Arithmetic, COVER_AT, Dialect, Form, INDICES_AT, Indexing, PROGRESS_AT, Part, ShaderVariant, TABLES_AT,
-    Tables, WORKGROUP, draws_per_thread, part,
+    Arithmetic, COVER_AT, Dialect, Form, GIVEN_AT, INDICES_AT, Indexing, PROGRESS_AT, Part, ShaderVariant,
+    TABLES_AT, Tables, WORKGROUP, draws_per_thread, part,
 };
 use crate::program::{IntensityLaw, Program};
 use crate::quantity::Dtype;
@@ -30,6 +31,7 @@ const WORDS: &str = include_str!("../../shaders/words.wgsl");
 const HALF: &str = include_str!("../../shaders/half.wgsl");
 const MAIN: &str = include_str!("../../shaders/main.wgsl");
 const SLICES: &str = include_str!("../../shaders/slices.wgsl");
+const GIVEN: &str = include_str!("../../shaders/given.wgsl");
 
 /// The most candidates that a draw tries in one dispatch. At 0 the program has too many bands for any.
 pub(crate) fn attempts_per_dispatch(program: &Program, target: Dialect) -> u32 {
@@ -43,7 +45,7 @@ pub(crate) fn attempts_per_dispatch(program: &Program, target: Dialect) -> u32 {
             let candidate = (1 + has_target) * program.bands() * value;
             // Halves are stored in a loop of two within another.
             let stores = (2 + value) * strides + 2 * has_target * program.bands() * value;
-            (stores, 1 + candidate + program.components().div_ceil(4))
+            (stores, 1 + candidate + program.normals().div_ceil(4))
         }
     };
     let draws = u64::from(draws_per_thread(program, target));
@@ -105,6 +107,7 @@ pub(crate) fn shader_without(
     let holds = |word: &str| match word {
         "sliced" => sliced,
         "whole" => !sliced,
+        "given" => program.given > 0,
         "ranged" => indexing == Indexing::Range,
         "listed" => indexing == Indexing::List,
         "exact" => arithmetic == Arithmetic::Exact,
@@ -112,8 +115,15 @@ pub(crate) fn shader_without(
     };
     let mut parts = vec![
         functions(program, &tables, (target, arithmetic), (sliced, false), part),
-        kept(PARAMETERS, holds).replace("INDICES_AT", &INDICES_AT.to_string()),
+        kept(PARAMETERS, holds)
+            .replace("INDICES_AT", &INDICES_AT.to_string())
+            .replace("GIVEN_AT", &GIVEN_AT.to_string())
+            .replace(" GIVEN_ARGUMENT", given(program, ", given_at(i)")),
     ];
+    if program.given > 0 {
+        let count = program.given;
+        parts.push(GIVEN.replace("VALUES", &list(count, |j| format!("givens[{count}u * i + {j}u]"))));
+    }
     if sliced {
         parts.push(SLICES.replace("PROGRESS_AT", &PROGRESS_AT.to_string()));
     }
@@ -165,6 +175,8 @@ pub(super) fn functions(
         false => "result.z, key, index, stream",
     };
     let draw = draw.replace("JUDGED", judged).replace("SCALED", scaled);
+    let draw = draw.replace(" GIVEN_PARAMETER", given(program, ", given: Given"));
+    let draw = draw.replace(" GIVEN_ARGUMENT", given(program, ", given"));
     let mut parts = vec![generator_without(target, part), PHYSICAL.to_owned()];
     if let Some(IntensityLaw::LogUniform { .. }) = program.intensity {
         parts.push(LOG_UNIFORM.replace("UNIFORM\n", UNIFORM));
@@ -174,6 +186,11 @@ pub(super) fn functions(
     }
     parts.extend([arithmetic(program, tables, form, part), draw]);
     parts.join("\n")
+}
+
+/// A text, where the draws of a program are given responses.
+fn given<'a>(program: &Program, text: &'a str) -> &'a str {
+    if program.given > 0 { text } else { "" }
 }
 
 /// Changes a program to one product in each band, with every normal in use.

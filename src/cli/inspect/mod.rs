@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
     let model = super::model_at(&arguments.model, arguments.wavelengths.as_ref())?;
-    let recipe = arguments.request.recipe(&model);
+    let recipe = arguments.request.settings(&model)?.builder(&model).build();
     let compared = match &recipe {
         Ok(recipe) => arguments.data.compare(recipe, arguments.seed)?,
         Err(refused) if arguments.data.is_asked() => return Err(refused.clone().into()),

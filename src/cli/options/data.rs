@@ -79,26 +79,16 @@ impl DataArguments {
     /// Reads what a name stands for: a built-in table, a file, an array of one. `grid` is that of files whose spectra have
     /// no wavelengths.
     pub(in crate::cli) fn read(&self, name: &str, grid: Option<&Grid>) -> anyhow::Result<Reading> {
-        let source = Source::of(name);
-        if Path::new(source.path).extension().is_none() && !Path::new(source.path).exists() {
-            return Err(Usage(no_data(name)).into());
-        }
-        let is_grid = |text: &&str| text.contains([':', ',']);
-        let measured = source.wavelengths.filter(is_grid).map(str::parse::<Grid>).transpose();
-        let measured = measured.map_err(|e| Usage(format!("{name:?}: {e}")))?;
         let options = ReadOptions {
-            array: source.array.map(str::to_owned),
-            wavelength_array: source.wavelengths.filter(|text| !is_grid(text)).map(str::to_owned),
-            measured_at: measured.map(|grid| grid.wavelengths().collect()),
-            fallback: grid.map(|grid| grid.wavelengths().collect()),
             layout: self.layout,
             unit: self.unit,
             separator: self.separator,
             decimal: self.decimal,
             skip: self.skip,
             missing_values: self.missing_value.clone(),
+            ..ReadOptions::default()
         };
-        Ok(Table::read(source.path, &options)?)
+        read(name, grid, options)
     }
 
     /// The table of a name, scaled, and notes on what was done to it.
@@ -129,6 +119,30 @@ impl DataArguments {
     pub(in crate::cli) fn scale(&self) -> f64 {
         self.scale
     }
+}
+
+/// Reads what a name stands for: a file, or an array of one as `FILE:ARRAY@WAVELENGTHS`. `grid` is that of files whose
+/// spectra have no wavelengths.
+pub(in crate::cli) fn read(
+    name: &str,
+    grid: Option<&Grid>,
+    settings: ReadOptions,
+) -> anyhow::Result<Reading> {
+    let source = Source::of(name);
+    if Path::new(source.path).extension().is_none() && !Path::new(source.path).exists() {
+        return Err(Usage(no_data(name)).into());
+    }
+    let is_grid = |text: &&str| text.contains([':', ',']);
+    let measured = source.wavelengths.filter(is_grid).map(str::parse::<Grid>).transpose();
+    let measured = measured.map_err(|e| Usage(format!("{name:?}: {e}")))?;
+    let options = ReadOptions {
+        array: source.array.map(str::to_owned),
+        wavelength_array: source.wavelengths.filter(|text| !is_grid(text)).map(str::to_owned),
+        measured_at: measured.map(|grid| grid.wavelengths().collect()),
+        fallback: grid.map(|grid| grid.wavelengths().collect()),
+        ..settings
+    };
+    Ok(Table::read(source.path, &options)?)
 }
 
 /// Says what a name that is no file's may have meant.

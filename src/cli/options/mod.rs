@@ -5,9 +5,11 @@ mod data;
 mod engine;
 mod output;
 mod recipe;
+mod sensors;
 mod shard;
 
 pub(super) use data::DataArguments;
 pub(super) use engine::EngineArguments;
 pub(super) use output::{OutputArguments, Purpose};
 pub(super) use recipe::RecipeArguments;
+pub(super) use sensors::{IlluminantSource, illuminant, sensors};

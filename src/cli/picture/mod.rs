@@ -3,6 +3,7 @@
 mod colours;
 pub(super) mod comparison;
 pub(super) mod look;
+pub(super) mod metamers;
 pub(super) mod model;
 mod panel;
 pub(super) mod scene;

@@ -89,6 +89,11 @@ impl<'a> Request<'a> {
 
     /// Reads the sources of the set; a text says which is missing.
     pub(super) fn sources(&self) -> anyhow::Result<Result<Sources, String>> {
+        if self.schema.attributes.contains_key("metamers_of") {
+            return Ok(Err(
+                "metamers are drawn again by the command that drew them, from their colours".to_owned()
+            ));
+        }
         let sources = match self.schema.attributes.contains_key("scene") {
             true => self.scenes()?,
             false => Ok(self.draws()?),

@@ -178,7 +178,7 @@ impl Column {
                 sheet.shown(last + 1)
             ));
         }
-        let mut spectra = Vec::new();
+        let (mut spectra, mut names) = (Vec::new(), Vec::new());
         let raw = self.raw(sheet);
         let mut percents = Percents::default();
         for column in 0..extent.width {
@@ -219,6 +219,7 @@ impl Column {
                 percents.count(sheet, row, column)?;
             }
             spectra.extend(values);
+            names.push(heading(sheet, extent, first, column));
         }
         if spectra.is_empty() {
             return Err(SheetError::new(
@@ -233,6 +234,7 @@ impl Column {
             source: format!("{}, {}", self.name(), self.axis.unit_note()),
             spectra: DMatrix::from_vec(self.rows.len(), columns, spectra),
             wavelengths: self.axis.values,
+            names: if names.iter().all(String::is_empty) { Vec::new() } else { names },
             notes,
         })
     }

@@ -25,6 +25,8 @@ pub(in crate::dataset) struct Laid {
     pub(in crate::dataset) wavelengths: Vec<f64>,
     /// A column for each spectrum.
     pub(in crate::dataset) spectra: DMatrix<f64>,
+    /// Names of the spectra; none where no spectrum has one.
+    pub(in crate::dataset) names: Vec<String>,
     pub(in crate::dataset) notes: Vec<String>,
 }
 

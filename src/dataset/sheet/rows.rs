@@ -183,6 +183,9 @@ impl Heading {
             }
         }
         let mut spectra = Vec::with_capacity(bands * self.rows.len());
+        let head = |row: usize| (0..columns.start).find_map(|column| sheet.text(row, column));
+        let names: Vec<String> =
+            self.rows.iter().map(|&row| head(row).unwrap_or_default().trim().to_owned()).collect();
         let mut percents = Percents::default();
         for &row in &self.rows {
             for column in columns.clone() {
@@ -199,6 +202,7 @@ impl Heading {
             source: format!("{}, {}", self.name(sheet), self.axis.unit_note()),
             spectra: DMatrix::from_vec(bands, self.rows.len(), spectra),
             wavelengths: self.axis.values,
+            names: if names.iter().all(String::is_empty) { Vec::new() } else { names },
             notes,
         })
     }

@@ -45,7 +45,8 @@ pub(super) fn read_text(
             format!("skipped the first {}, as asked for", counted(options.skip as u64, "line", "lines")),
         );
     }
-    let table = Table::from_measured(&format!("{path:?}"), laid.wavelengths, laid.spectra, &mut notes)?;
+    let mut table = Table::from_measured(&format!("{path:?}"), laid.wavelengths, laid.spectra, &mut notes)?;
+    table.names = laid.names;
     Ok(Reading {
         table,
         format: format.to_owned(),
@@ -78,7 +79,8 @@ pub(super) fn read_sheet(
 ) -> Result<Reading, DatasetError> {
     let laid = lay_out(sheet, options, super::reading::Decimal::Point).map_err(|e| e.of(path))?;
     let mut notes = laid.notes;
-    let table = Table::from_measured(&format!("{path:?}"), laid.wavelengths, laid.spectra, &mut notes)?;
+    let mut table = Table::from_measured(&format!("{path:?}"), laid.wavelengths, laid.spectra, &mut notes)?;
+    table.names = laid.names;
     Ok(Reading {
         table,
         format: format.to_owned(),

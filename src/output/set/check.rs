@@ -72,7 +72,8 @@ pub(in crate::output) fn check_schema(schema: &Schema) -> Result<(), String> {
 }
 
 fn is_sound(field: &Field) -> bool {
-    let outer = field.outer.as_ref().map_or(1, |(_, count)| *count);
+    let extents = field.outer.iter().chain(&field.middle).map(|(_, count)| *count);
+    let outer = extents.fold(1usize, usize::saturating_mul);
     let is_whole = field.stored == Dtype::U32;
     (1..=VALUES).contains(&(field.width as u64))
         && outer > 0

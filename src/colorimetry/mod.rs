@@ -1,5 +1,12 @@
-//! CIE 1931 colorimetry on a grid: the only home of the colour matching functions of the 2 degree observer, of D65,
-//! and of the weights that turn a reflectance into its luminous reflectance (LRV).
+//! Colorimetry of the CIE on a grid: the only home of the standard observers, of illuminants, and of the weights that turn
+//! a reflectance into its tristimulus values and its luminous reflectance (LRV). Functions that name no observer are of
+//! the CIE 1931 2 degree observer.
+
+mod illuminant;
+mod observer;
+
+pub use illuminant::{Illuminant, IlluminantError};
+pub use observer::Observer;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,7 +20,7 @@ pub fn d65(grid: &Grid) -> Vec<f64> {
 
 /// The CIE 1931 2 degree observer's colour matching functions x, y and z on a grid; zero outside 360 to 830 nm.
 pub fn cmf(grid: &Grid) -> [Vec<f64>; 3] {
-    [0, 1, 2].map(|function| on_grid(BuiltinTable::Xyz1931, function, grid))
+    Observer::Cie1931.cmf(grid)
 }
 
 /// The CIE standard illuminant A on a grid (relative power, 100 at 560 nm): a black body of 2848 K in the temperature
@@ -29,11 +36,9 @@ fn on_grid(table: BuiltinTable, spectrum: usize, grid: &Grid) -> Vec<f64> {
     grid.wavelengths().map(|w| spline.at(w, Extrapolation::Zero)).collect()
 }
 
-/// Weights of X, Y and Z for the power of a light in each band, per nm: its tristimulus values are sums of the products,
-/// times the step of the grid or, on an uneven one, the widths of the trapezoid rule.
+/// Weights of X, Y and Z for the power of a light in each band: [`Observer::emitted_xyz_weights`] of 1931.
 pub fn emitted_xyz_weights(grid: &Grid) -> [Vec<f64>; 3] {
-    let widths = grid.widths();
-    cmf(grid).map(|f| f.iter().zip(&widths).map(|(f, width)| f * width).collect())
+    Observer::Cie1931.emitted_xyz_weights(grid)
 }
 
 /// Weights of X, Y and Z for reflectances under D65 (1931 2 degree observer): tristimulus values are their products
@@ -42,15 +47,9 @@ pub fn xyz_weights(grid: &Grid) -> Option<[Vec<f64>; 3]> {
     xyz_weights_under(&d65(grid), grid)
 }
 
-/// Weights of X, Y and Z for reflectances under `light`, the power of an illuminant in each band, in any unit: a
-/// perfect white has Y = 1. `None` where none of its light is visible.
+/// Weights of X, Y and Z for reflectances under `light`: [`Observer::xyz_weights_under`] of 1931.
 pub fn xyz_weights_under(light: &[f64], grid: &Grid) -> Option<[Vec<f64>; 3]> {
-    let cmf = cmf(grid);
-    // Widths relative to the first are 1 on an even grid, so that its weights are those of a plain sum to the last bit.
-    let widths = grid.widths();
-    let light: Vec<f64> = light.iter().zip(&widths).map(|(e, width)| e * (width / widths[0])).collect();
-    let white: f64 = light.iter().zip(&cmf[1]).map(|(e, y)| e * y).sum();
-    (white > 0.0).then(|| cmf.map(|f| light.iter().zip(&f).map(|(e, f)| e * f / white).collect()))
+    Observer::Cie1931.xyz_weights_under(light, grid)
 }
 
 /// Weights of the luminous reflectance, LRV(r) = sum r D65 y / sum D65 y: CIE Y of the 1931 2 degree observer under
