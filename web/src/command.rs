@@ -136,10 +136,9 @@ fn recipe_options(line: &mut String, recipe: &RecipeSettings) {
         let names: Vec<_> = recipe.quantities.iter().map(|quantity| quantity.name()).collect();
         option(line, "--quantities", names.join(","));
     }
-    match recipe.illuminant {
-        Illuminant::A => option(line, "--illuminant", "a"),
-        Illuminant::E => option(line, "--illuminant", "e"),
-        _ => {}
+    let light = Illuminant::NAMED.into_iter().find(|(_, light)| *light == recipe.illuminant);
+    if let Some((light, _)) = light.filter(|_| recipe.illuminant != default.illuminant) {
+        option(line, "--illuminant", light);
     }
     if recipe.proposal != ProposalKind::Auto {
         option(line, "--proposal", name(&recipe.proposal));

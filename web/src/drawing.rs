@@ -1,12 +1,13 @@
 //! Recipes that can be drawn, and draws of the CPU.
 
+use std::num::NonZeroUsize;
+
 use spectroll::export::{Destination, DrawExport, Output};
 use spectroll::output::FileFormat;
 use spectroll::{
     DrawRange, DrawStatus, DrawSummary, Engine, EngineChoice, Model, Quantity, Recipe, RecipeError,
     RecipeSettings, ShaderVariant, SpectrumKind, Stream, XyzScale,
 };
-use std::num::NonZeroUsize;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::export::Export;
@@ -58,11 +59,11 @@ impl Drawing {
         Drawing::of(settings.builder(model).build())
     }
 
-    fn of(built: Result<Recipe, RecipeError>) -> Result<Drawing, Refusal> {
-        Ok(Drawing { recipe: built.map_err(Refusal::new)? })
+    pub(crate) fn of(built: Result<Recipe, RecipeError>) -> Result<Drawing, Refusal> {
+        Ok(Drawing { recipe: built? })
     }
 
-    fn draw_range(&self, draws: DrawRange) -> Result<Drawn, Refusal> {
+    pub(crate) fn draw_range(&self, draws: DrawRange) -> Result<Drawn, Refusal> {
         let formats = self.recipe.formats();
         let words = |format: &spectroll::ArrayFormat| vec![0u32; format.bytes(draws.count).div_ceil(4) as usize];
         let mut arrays: Vec<_> = formats.iter().map(|format| (format.quantity, words(format))).collect();

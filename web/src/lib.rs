@@ -12,6 +12,7 @@ mod drawing;
 mod export;
 mod fitted;
 mod kernel;
+mod metamers;
 mod refusal;
 mod settings;
 
@@ -21,4 +22,5 @@ pub use drawing::{Drawing, Drawn};
 pub use export::Export;
 pub use fitted::Fitted;
 pub use kernel::Kernel;
+pub use metamers::Metamers;
 pub use refusal::Refusal;

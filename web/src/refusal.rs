@@ -3,8 +3,10 @@
 use std::fmt;
 
 use serde::Serialize;
-use spectroll::{DatasetError, FitError, Remedy};
+use spectroll::{DatasetError, FitError, RecipeError, Remedy};
 use wasm_bindgen::JsValue;
+
+use crate::metamers::nearest;
 
 /// A message of the library, and the control of the page that may mend what it says.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -14,12 +16,22 @@ pub struct Refusal {
     /// Name of the control, as in its `id`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub control: Option<&'static str>,
+    /// The nearest colour that can be drawn, as `#rrggbb`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nearest: Option<String>,
 }
 
 impl Refusal {
     /// A refusal without a control that mends it.
     pub(crate) fn new(error: impl fmt::Display) -> Refusal {
-        Refusal { message: error.to_string(), control: None }
+        Refusal { message: error.to_string(), control: None, nearest: None }
+    }
+}
+
+impl Refusal {
+    /// The refusal of a colour.
+    pub(crate) fn of_colour(self) -> Refusal {
+        Refusal { control: Some("colour"), ..self }
     }
 }
 
@@ -43,6 +55,12 @@ impl From<DatasetError> for Refusal {
             _ => control(error.remedy()),
         };
         Refusal { control, ..Refusal::new(error) }
+    }
+}
+
+impl From<RecipeError> for Refusal {
+    fn from(error: RecipeError) -> Refusal {
+        Refusal { nearest: nearest(&error), ..Refusal::new(error) }
     }
 }
 

@@ -69,6 +69,7 @@ const SURFACES = [
   ["illuminant", "a", /--illuminant a/],
   ["dtype", "f64", /--dtype f64/],
   ["engine", "cpu", /--dtype f64/],
+  ["colour", "#8899aa", /--dtype f64/],
   ["components", "4", /fit munsell vrhel -k 4 /],
   ["wavelengths", "420:20:680", /--wavelengths 420:20:680/],
 ];
@@ -222,6 +223,22 @@ test("settings that cannot be drawn say why", async () => {
   await go(page, "#");
   assert.equal(await page.isVisible("#refusal"), false);
   assert.equal(await page.isVisible("#draw-refusal"), false);
+  await page.context().close();
+});
+
+test("metamers are drawn of a colour, and the nearest is offered of one that no surface has", async () => {
+  const page = await open(browser, server.address);
+  assert.match(await page.textContent("#metamers-remark"), /candidates of this colour/);
+  await set(page, "colour", "#00ff00");
+  assert.match(await page.textContent("#colour-refusal"), /No surface of this model has this colour/);
+  await page.click("#nearest");
+  await page.waitForFunction(() => document.getElementById("colour-refusal").hidden);
+  assert.match(await page.textContent("#metamers-remark"), /candidates of this colour/);
+  assert.notEqual(await page.inputValue("#colour"), "#00ff00");
+  assert.match(await page.evaluate(() => location.hash), /colour=/);
+  await page.check('input[name="model"][value="granada"]');
+  await ready(page);
+  assert.equal(await page.isVisible("#metamers"), false);
   await page.context().close();
 });
 

@@ -13,6 +13,7 @@ const short = (value) => String(Number(value.toPrecision(3)));
 /** Shows a state in the controls. */
 export function show(state) {
   for (const name of PLAIN) element(name).value = state[name];
+  element("colour").value = `#${state.colour}`;
   for (const radio of document.querySelectorAll('input[name="model"]')) radio.checked = radio.value === state.model;
   const lrv = state.lrv === "" ? [] : state.lrv.split("..");
   element("lrv-mode").value = ["none", "fixed", "range"][lrv.length] ?? "none";
@@ -29,6 +30,7 @@ export function show(state) {
 /** Takes what the controls say into a state. */
 export function take(state) {
   for (const name of PLAIN) state[name] = element(name).value.trim();
+  state.colour = element("colour").value.slice(1);
   const chosen = document.querySelector('input[name="model"]:checked');
   if (chosen) state.model = chosen.value;
   const [low, high] = [element("lrv-low").value, element("lrv-high").value];

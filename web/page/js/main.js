@@ -2,8 +2,10 @@
 
 import { arrange, element, keepApart, listBuiltins, listFile, refuse, show, take } from "./controls.js";
 import { Latest, Library } from "./library.js";
+import { surface as clear } from "./plot.js";
 import {
   basisPanel, chipsPanel, chromaticityPanel, curvesPanel, dataPanel, left, leftPanel, meanPanel,
+  metamerChipsPanel, metamerCurvesPanel,
 } from "./panels.js";
 import { DEFAULTS, FILE, drawsOf, fromAddress, recipeOf, toAddress } from "./state.js";
 import { Take } from "./take.js";
@@ -13,7 +15,7 @@ const [DRAW, FIT, OPEN] = [1, 2, 3];
 
 const state = fromAddress(location.hash);
 /** What is shown: the data, the model and its draws. */
-const view = { data: null, model: null, draws: null, locus: [] };
+const view = { data: null, model: null, draws: null, metamers: null, locus: [] };
 /** The file that was dropped. */
 let dropped = null;
 let builtins = [];
@@ -32,7 +34,10 @@ const updates = new Latest(async ({ isPreview }, isStale) => {
     if (step >= OPEN) await open();
     if (step >= FIT) await fit();
     if (!isStale() || isPreview) await draw(isPreview);
-    if (!isPreview) await taking.refresh();
+    if (!isPreview) {
+      await taking.refresh();
+      if (!isStale()) await drawMetamers();
+    }
   } catch (error) {
     fail(error);
   }
@@ -116,6 +121,38 @@ async function draw(isPreview) {
   paintDraws();
 }
 
+/** Number of metamers. */
+const METAMERS = 60;
+
+async function drawMetamers() {
+  if (view.model.kind !== "reflectance") return;
+  try {
+    view.metamers = await library.call("metamers", { colour: state.colour, seed: drawsOf(state).seed, count: METAMERS });
+    refuse("colour-refusal", null);
+    paintMetamers();
+  } catch (error) {
+    view.metamers = null;
+    refuseColour(error);
+  }
+}
+
+/** Says why there are no metamers of a colour, and offers the nearest of which there are. */
+function refuseColour(error) {
+  const { nearest } = error;
+  refuse("colour-refusal", nearest ? { message: "No surface of this model has this colour." } : error);
+  clear(element("metamer-curves"));
+  clear(element("metamer-chips"));
+  element("metamers-remark").textContent = "";
+  if (!nearest) return;
+  const button = Object.assign(document.createElement("button"), { type: "button", id: "nearest", textContent: `Take the nearest, ${nearest}` });
+  button.onclick = () => {
+    element("colour").value = nearest;
+    element("colour").focus();
+    changed(element("colour"), false);
+  };
+  element("colour-refusal").append(button);
+}
+
 function fail(error) {
   if (error.isOfData) {
     // What is shown is of other data, and fades.
@@ -186,7 +223,21 @@ function paintDraws() {
       : `Drawn by the CPU in WebAssembly${reason ? `: ${reason}` : ""}`;
 }
 
-const SEEN = { d65: "daylight D65", a: "incandescent light A", e: "equal-energy light E" };
+function paintMetamers() {
+  metamerCurvesPanel(element("metamer-curves"), view);
+  metamerChipsPanel(element("metamer-chips"), view);
+  const [made, attempts] = view.metamers.counts;
+  element("metamers-remark").textContent = `${percent(made / attempts)} of the candidates of this colour are surfaces: between 0 and 1 everywhere.`;
+}
+
+const SEEN = {
+  d65: "daylight D65",
+  d50: "daylight D50",
+  a: "incandescent light A",
+  f2: "fluorescent light F2",
+  f11: "fluorescent light F11",
+  e: "equal-energy light E",
+};
 
 function account({ name, reading: read, spectra, missing }) {
   element("reading-name").textContent = name;
@@ -221,6 +272,7 @@ function repaint() {
   if (!view.model) return;
   paintModel();
   if (view.draws) paintDraws();
+  if (view.metamers && view.model.kind === "reflectance") paintMetamers();
 }
 
 // ---- what is typed, moved and dropped
@@ -231,7 +283,7 @@ const READING = ["kind", "percent", "layout", "missing", "missing-value", "unit"
 function listen() {
   for (const control of document.querySelectorAll("main input, main select")) {
     if (control.id === "file") continue;
-    const isSlider = control.type === "range";
+    const isSlider = ["range", "color"].includes(control.type);
     if (isSlider) control.addEventListener("input", () => changed(control, true));
     control.addEventListener("change", () => changed(control, false));
   }
@@ -272,9 +324,20 @@ function changed(control, isPreview) {
     taking.refresh();
     return;
   }
+  if (control.id === "colour") {
+    keepAddress();
+    recolour.ask();
+    return;
+  }
   const step = READING.includes(control.id) && control.id !== "missing" ? OPEN : (STEPS[control.id] ?? DRAW);
   update(step, isPreview);
 }
+
+const recolour = new Latest(async () => {
+  setBusy(true);
+  if (view.model) await drawMetamers();
+  setBusy(false);
+});
 
 function listenForFiles() {
   const veil = element("drop-veil");

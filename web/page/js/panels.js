@@ -239,3 +239,44 @@ export function chromaticityPanel(canvas, { draws, model, locus }) {
   const white = locus.length - 2;
   context.fillText("D65", px(locus[white]) + 9, py(locus[white + 1]) - 9);
 }
+
+/** Metamers as curves, in the colour that they share. */
+export function metamerCurvesPanel(canvas, { metamers, model }) {
+  const { wavelengths, kind } = model;
+  const frame = axes(canvas, { x: ends(wavelengths), y: limits(kind, extent(metamers.spectra)), xLabel: WAVELENGTH, yLabel: label(kind) });
+  const { context, colours } = frame;
+  context.strokeStyle = colourOf(colours, metamers.lights[0].colours, 0);
+  context.globalAlpha = 0.8;
+  within(frame, () => {
+    for (let i = 0; i * wavelengths.length < metamers.spectra.length; i++) {
+      curve(frame, wavelengths, metamers.spectra, i * wavelengths.length);
+    }
+  });
+  context.globalAlpha = 1;
+}
+
+/** The colours of metamers under each light, a block each: where they part, a block is not of one colour. */
+export function metamerChipsPanel(canvas, { metamers }) {
+  const { context, width, height } = surface(canvas);
+  const { ink, font } = theme();
+  const { lights } = metamers;
+  const [gap, top] = [10, 20];
+  const block = (width - gap * (lights.length - 1)) / lights.length;
+  context.font = `13px ${font}`;
+  context.textBaseline = "top";
+  lights.forEach(({ name, colours }, number) => {
+    const left = number * (block + gap);
+    context.fillStyle = ink;
+    context.fillText(name, left, 0);
+    const count = colours.length / 3;
+    const columns = Math.max(1, Math.round(Math.sqrt((count * block) / (height - top))));
+    const rows = Math.ceil(count / columns);
+    const [w, h] = [block / columns, (height - top) / rows];
+    for (let i = 0; i < count; i++) {
+      context.fillStyle = `rgb(${colours.subarray(3 * i, 3 * i + 3).join(" ")})`;
+      const [x, y] = [left + (i % columns) * w, top + Math.floor(i / columns) * h];
+      // Without seams, so that what is of one colour is seen as one.
+      context.fillRect(x - 0.25, y - 0.25, w + 0.5, h + 0.5);
+    }
+  });
+}

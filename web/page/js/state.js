@@ -13,6 +13,7 @@ export const DEFAULTS = Object.freeze({
   proposal: "auto",
   illuminant: "d65",
   engine: "auto",
+  colour: "7f9a55",
   quantity: "spectra",
   dtype: "f32",
 });
@@ -71,14 +72,15 @@ export function recipeOf(state, kind, quantities = ["spectra"]) {
     const value = range(state.intensity, "intensity");
     intensity = Array.isArray(value) ? { loguniform: value } : { fixed: value };
   }
-  const hasColours = quantities.some((name) => ["xyz", "linear_srgb", "chromaticity"].includes(name));
+  // Where nothing is seen the light changes nothing, and the library refuses settings that change nothing.
+  const isSeen = lrv !== null || quantities.some((name) => ["xyz", "linear_srgb", "chromaticity", "lrv"].includes(name));
   return {
     lrv: Array.isArray(lrv) ? { uniform: lrv } : lrv,
     bounds: lrv === null ? "base" : state.bounds,
     cov_scale: number(state["cov-scale"], "cov-scale"),
     intensity,
     quantities,
-    illuminant: isLight || !hasColours ? "d65" : state.illuminant,
+    illuminant: isLight || !isSeen ? "d65" : state.illuminant,
     xyz_scale: "absolute",
     proposal: state.proposal,
     max_attempts: 65000,

@@ -1,6 +1,6 @@
 // The library and the engines, off the page's own thread.
 
-import init, { Data, builtins, encodeColours, locus } from "../library/spectroll.js";
+import init, { Data, Metamers, builtins, encodeColours, locus } from "../library/spectroll.js";
 import { Gpu } from "./gpu.js";
 
 /** Draws whose curves and colours are shown. */
@@ -181,6 +181,16 @@ const calls = {
       preparation: built - started,
       isPreview: Boolean(isPreview),
     };
+  },
+
+  /** Spectra of a colour, and their colours under some lights. */
+  async metamers({ colour, seed, count }) {
+    const rgb = Uint8Array.from(colour.match(/../g), (two) => parseInt(two, 16));
+    const drawn = fitted.metamers(rgb, seed, count);
+    const lights = Metamers.lights().split(",").map((name, i) => ({ name, colours: drawn.colours(i) }));
+    const result = { spectra: drawn.spectra(), lights, counts: drawn.counts() };
+    drawn.free();
+    return result;
   },
 
   /** The bytes of a file of draws, and their sum. */
