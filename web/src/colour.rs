@@ -75,6 +75,10 @@ mod tests {
     fn the_locus_ends_in_d65() {
         let locus = locus();
         assert_eq!(locus.len(), 2 * 62);
-        assert!((locus[122] - 0.3127).abs() < 1e-3 && (locus[123] - 0.329).abs() < 1e-3, "{:?}", &locus[122..]);
+        assert!(
+            (locus[122] - 0.3127).abs() < 1e-3 && (locus[123] - 0.329).abs() < 1e-3,
+            "{:?}",
+            &locus[122..]
+        );
     }
 }

@@ -191,8 +191,7 @@ mod tests {
         assert_eq!(line, expected);
         let fine = data.fit(r#"{"wavelengths":"400:5:700"}"#).unwrap();
         let line = lines(&fine, &RecipeSettings::default(), &Draws { dtype: "f16", ..DRAWS });
-        let expected =
-            "spectroll sample munsell-vrhel --wavelengths 400:5:700 -n 1000 --seed 7 --dtype f16 -o draws.npy";
+        let expected = "spectroll sample munsell-vrhel --wavelengths 400:5:700 -n 1000 --seed 7 --dtype f16 -o draws.npy";
         assert_eq!(line, expected);
         let more = data.fit(r#"{"components":12}"#).unwrap();
         let expected = "spectroll fit munsell vrhel -k 12 --kind reflectance -o munsell-vrhel-12.json\n\
@@ -203,7 +202,8 @@ mod tests {
     #[test]
     fn a_file_is_fitted_first_with_the_settings_it_was_read_with() {
         let text = "nm,a,b,c\n400,10,20,30\n410,20,30,35\n420,30,20,10\n";
-        let data = Data::read("it's mine.csv", text.into(), r#"{"percent":true,"layout":"columns"}"#).unwrap();
+        let data =
+            Data::read("it's mine.csv", text.into(), r#"{"percent":true,"layout":"columns"}"#).unwrap();
         let fit = r#"{"components":1,"kind":"reflectance","wavelengths":"400:10:420","missing":"drop"}"#;
         let expected = "spectroll fit 'it'\\''s mine.csv' -k 1 --kind reflectance --wavelengths 400:10:420 \
                         --missing drop --layout columns --scale 0.01 -o 'it'\\''s mine.json'\n\

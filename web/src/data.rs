@@ -25,6 +25,8 @@ pub struct Data {
     pub(crate) origin: Origin,
     pub(crate) tables: Vec<Table>,
     pub(crate) kind: Option<SpectrumKind>,
+    /// Whether the kind is only likely, by the values.
+    is_guess: bool,
     reading: Option<Account>,
 }
 
@@ -45,6 +47,7 @@ struct Facts<'a> {
     name: &'a str,
     spectra: usize,
     kind: Option<SpectrumKind>,
+    is_guess: bool,
     first_nm: f64,
     last_nm: f64,
     missing: usize,
@@ -98,7 +101,13 @@ impl Data {
         let data = Model::builtin_data(name).map_err(Refusal::new)?;
         let name = Model::BUILTIN.iter().find(|known| **known == name).expect("it has data");
         let tables = data.tables.iter().map(|table| table.table()).collect();
-        Ok(Data { origin: Origin::Builtin(name), tables, kind: Some(data.kind), reading: None })
+        Ok(Data {
+            origin: Origin::Builtin(name),
+            tables,
+            kind: Some(data.kind),
+            is_guess: false,
+            reading: None,
+        })
     }
 
     /// Spectra of a file, read with settings that are JSON.
@@ -107,9 +116,11 @@ impl Data {
         let reading = Table::from_bytes(name, bytes, &settings.options()?)?;
         let Reading { table, format, dialect, layout, wavelengths, notes, others, .. } = reading;
         let reading = Some(Account { format, dialect, layout, wavelengths, notes, others });
-        let kind = table.kind();
-        let tables = vec![table.scaled(settings.scale())];
-        Ok(Data { origin: Origin::File(name.to_owned(), settings), tables, kind, reading })
+        let table = table.scaled(settings.scale());
+        let kind = table.kind().or_else(|| likely(&table));
+        let is_guess = table.kind().is_none();
+        let origin = Origin::File(name.to_owned(), settings);
+        Ok(Data { origin, tables: vec![table], kind, is_guess, reading })
     }
 
     /// Facts about the data as JSON.
@@ -123,6 +134,7 @@ impl Data {
             name,
             spectra: self.tables.iter().map(Table::len).sum(),
             kind: self.kind,
+            is_guess: self.is_guess,
             first_nm: ends(|w| w[0]).fold(f64::INFINITY, f64::min),
             last_nm: ends(|w| w[w.len() - 1]).fold(f64::NEG_INFINITY, f64::max),
             missing: self.tables.iter().map(Table::missing).sum(),
@@ -164,6 +176,13 @@ impl Data {
     }
 }
 
+/// Reflectances, where every value is between 0 and 1; `None` of anything else. The page says that this is a guess.
+fn likely(table: &Table) -> Option<SpectrumKind> {
+    let values = (0..table.len()).flat_map(|index| table.spectrum(index));
+    let are_shares = values.filter(|value| !value.is_nan()).all(|value| (0.0..=1.0).contains(value));
+    are_shares.then_some(SpectrumKind::Reflectance)
+}
+
 /// Indices of at most `most` of `count` things, evenly chosen.
 fn chosen(count: usize, most: usize) -> Vec<usize> {
     let shown = count.min(most);
@@ -186,6 +205,15 @@ mod tests {
         assert_eq!((&facts["spectra"], &facts["first_nm"]), (&3.into(), &400.0.into()));
         assert_eq!(facts["reading"]["format"], "text");
         assert_eq!(read(r#"{"percent":true}"#).curves(0, 9)[..3], [0.1, 0.2, 0.3]);
+    }
+
+    #[test]
+    fn shares_are_likely_reflectances_and_nothing_else_is_guessed() {
+        assert_eq!(read("{}").kind, None);
+        let guessed = read(r#"{"percent":true}"#);
+        assert_eq!((guessed.kind, guessed.is_guess), (Some(SpectrumKind::Reflectance), true));
+        let refusal = read("{}").fit(r#"{"components":1,"wavelengths":"400:10:420"}"#).unwrap_err();
+        assert_eq!(refusal.control, Some("kind"));
     }
 
     #[test]

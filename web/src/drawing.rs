@@ -34,9 +34,14 @@ pub struct Drawn {
 pub(crate) const TRIAL: &str = "trial";
 
 impl Drawing {
-    pub(crate) fn new(model: &Model, mut settings: RecipeSettings, quantities: &str) -> Result<Drawing, Refusal> {
+    pub(crate) fn new(
+        model: &Model,
+        mut settings: RecipeSettings,
+        quantities: &str,
+    ) -> Result<Drawing, Refusal> {
         if quantities.is_empty() {
-            let mut all = vec![Quantity::Spectra, Quantity::LinearSrgb, Quantity::Attempts, Quantity::Chromaticity];
+            let mut all =
+                vec![Quantity::Spectra, Quantity::LinearSrgb, Quantity::Attempts, Quantity::Chromaticity];
             if model.kind() == SpectrumKind::Illuminant {
                 settings.xyz_scale = XyzScale::UnitY;
             } else {
@@ -47,7 +52,7 @@ impl Drawing {
                 // A grid that the eye sees nothing of.
                 Err(RecipeError::Invisible(_)) if settings.lrv.is_none() => {
                     settings.quantities = vec![Quantity::Spectra, Quantity::Attempts];
-                    settings.xyz_scale = XyzScale::default();
+                    (settings.xyz_scale, settings.illuminant) = Default::default();
                 }
                 built => return Drawing::of(built),
             }
@@ -65,9 +70,11 @@ impl Drawing {
 
     pub(crate) fn draw_range(&self, draws: DrawRange) -> Result<Drawn, Refusal> {
         let formats = self.recipe.formats();
-        let words = |format: &spectroll::ArrayFormat| vec![0u32; format.bytes(draws.count).div_ceil(4) as usize];
+        let words =
+            |format: &spectroll::ArrayFormat| vec![0u32; format.bytes(draws.count).div_ceil(4) as usize];
         let mut arrays: Vec<_> = formats.iter().map(|format| (format.quantity, words(format))).collect();
-        let engine = Engine::with_threads(&EngineChoice::Cpu, Some(NonZeroUsize::MIN)).map_err(Refusal::new)?;
+        let engine =
+            Engine::with_threads(&EngineChoice::Cpu, Some(NonZeroUsize::MIN)).map_err(Refusal::new)?;
         let mut session = engine.session(&self.recipe).map_err(Refusal::new)?;
         let mut slices: Vec<_> =
             arrays.iter_mut().map(|(_, words)| bytemuck::cast_slice_mut(words.as_mut_slice())).collect();
@@ -141,11 +148,22 @@ impl Drawing {
     }
 
     /// Begins a file, `npy` or `csv`, of one quantity of draws.
-    pub fn export(&self, format: &str, name: &str, of_type: &str, seed: u64, count: u32) -> Result<Export, Refusal> {
+    pub fn export(
+        &self,
+        format: &str,
+        name: &str,
+        of_type: &str,
+        seed: u64,
+        count: u32,
+    ) -> Result<Export, Refusal> {
         let format = match format {
             "npy" => FileFormat::Npy,
             "csv" => FileFormat::Csv,
-            _ => return Err(Refusal::new(format_args!("{format:?} is no format of a download: npy and csv are"))),
+            _ => {
+                return Err(Refusal::new(format_args!(
+                    "{format:?} is no format of a download: npy and csv are"
+                )));
+            }
         };
         let draws = Stream::new(seed).draws(0..count.into());
         let output = Output::at("-", Destination::Stdout(format)).dtype(dtype(of_type)?);

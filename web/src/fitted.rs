@@ -1,7 +1,9 @@
 //! A model on the page: fitted here, or built in.
 
 use serde::Serialize;
-use spectroll::{Dataset, Fit, Grid, MAX_COMPONENTS, Model, Recipe, RecipeSettings, Resampling, SpectrumKind};
+use spectroll::{
+    Dataset, Fit, Grid, MAX_COMPONENTS, Model, Recipe, RecipeSettings, Resampling, SpectrumKind,
+};
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::colour;
@@ -121,7 +123,9 @@ impl Fitted {
 
     /// Chromaticities x and y of the data, two values a spectrum; empty where they have none.
     pub fn chromaticities(&self) -> Vec<f32> {
-        let Some(weights) = colour::xyz_weights(Some(self.kind), self.model.grid()) else { return Vec::new() };
+        let Some(weights) = colour::xyz_weights(Some(self.kind), self.model.grid()) else {
+            return Vec::new();
+        };
         let spectra = self.data.spectra();
         let xy = |spectrum: &[f64]| colour::chromaticity(colour::xyz(&weights, spectrum));
         spectra.column_iter().flat_map(|spectrum| xy(spectrum.as_slice())).collect()
@@ -146,7 +150,14 @@ impl Fitted {
     }
 
     /// The command lines that write the same bytes as a download.
-    pub fn command(&self, settings: &str, file: &str, dtype: &str, count: u32, seed: u64) -> Result<String, Refusal> {
+    pub fn command(
+        &self,
+        settings: &str,
+        file: &str,
+        dtype: &str,
+        count: u32,
+        seed: u64,
+    ) -> Result<String, Refusal> {
         let settings: RecipeSettings = parse(settings)?;
         Ok(command::lines(self, &settings, &command::Draws { file, dtype, count, seed }))
     }

@@ -57,7 +57,8 @@ impl Fitted {
         let white = white(&Illuminant::D65, self).expect("it has visible light").1;
         let responses = conversion.responses(encoded);
         let xyz = [0, 1, 2].map(|i| responses[i] * white[i]);
-        let recipe = Recipe::builder(&self.model).xyz(xyz).quantities([Quantity::Spectra, Quantity::Attempts]);
+        let recipe =
+            Recipe::builder(&self.model).xyz(xyz).quantities([Quantity::Spectra, Quantity::Attempts]);
         let drawing = Drawing::of(recipe.build()).map_err(|refusal| refusal.of_colour())?;
         let drawn = drawing.draw_range(Stream::new(seed).draws(0..count.into()))?;
         let spectra = drawn.values(Quantity::Spectra.name());

@@ -83,8 +83,7 @@ impl ReadSettings {
 }
 
 fn unit(name: &str) -> Option<WavelengthUnit> {
-    let units =
-        [WavelengthUnit::Nm, WavelengthUnit::Um, WavelengthUnit::Angstrom, WavelengthUnit::PerCm];
+    let units = [WavelengthUnit::Nm, WavelengthUnit::Um, WavelengthUnit::Angstrom, WavelengthUnit::PerCm];
     units.into_iter().find(|unit| unit.name() == name)
 }
 

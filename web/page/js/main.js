@@ -86,6 +86,7 @@ async function open() {
     keepNote();
   }
   element("reading").hidden = !isFile;
+  element("reading").open ||= isFile && view.data.is_guess;
 }
 
 async function fit() {
@@ -178,9 +179,10 @@ function paintModel() {
   const k = model.basis.length;
   const of = `${model.spectra.toLocaleString("en")} ${what} at ${model.grid} nm`;
   element("explained").textContent = `${k} ${k === 1 ? "component explains" : "components explain"} ${(100 - rest).toFixed(rest < 0.01 ? 4 : 2)} % of ${of}.`;
-  const many = data.spectra > 200 ? `, 200 of ${data.spectra.toLocaleString("en")}` : "";
-  element("data-caption").textContent = `Spectra as measured, ${short(data.first_nm)} to ${short(data.last_nm)} nm${many}`;
-  element("basis-caption").textContent = `Basis, by its share: ${model.explained.slice(0, 3).map(percent).join(", ")}${k > 3 ? " …" : ""}`;
+  const many = data.spectra > 200 ? `some of ${data.spectra.toLocaleString("en")}` : `all ${data.spectra}`;
+  element("data-caption").textContent = `As measured, ${many}`;
+  const shares = model.explained.slice(0, 3).map((share) => `${(100 * share).toFixed(1)} %`);
+  element("basis-caption").textContent = `Basis: ${shares.join(", ")}${k > 3 ? " …" : ""}`;
   element("left-caption").textContent = `Variance left unexplained: ${rest < 0.001 ? rest.toExponential(1) : rest.toFixed(3)} %`;
   element("model-notes").replaceChildren(
     ...[...model.notes, ...model.unusual].map((note) => Object.assign(document.createElement("li"), { textContent: note })),
@@ -190,8 +192,6 @@ function paintModel() {
   basisPanel(element("basis"), model);
   leftPanel(element("left"), model);
 }
-
-const short = (nm) => Number(nm.toFixed(1));
 
 function paintDraws() {
   const { draws, model } = view;
@@ -239,13 +239,14 @@ const SEEN = {
   e: "equal-energy light E",
 };
 
-function account({ name, reading: read, spectra, missing }) {
+function account({ name, reading: read, spectra, missing, kind, is_guess }) {
   element("reading-name").textContent = name;
   const facts = {
     format: [read.format, read.dialect].filter(Boolean).join(", "),
     layout: read.layout,
     wavelengths: read.wavelengths,
     spectra: `${spectra.toLocaleString("en")}${missing ? `, with ${missing.toLocaleString("en")} missing values` : ""}`,
+    kind: is_guess && kind && !element("kind").value ? "taken for reflectances, since every value is between 0 and 1: choose lights if they are" : "",
     notes: read.notes.join("; "),
     "also there": read.others.join(", "),
   };

@@ -12,14 +12,10 @@ function limits(kind, [, high], low = 0) {
   return [Math.min(0, low), high * 1.06 || 1];
 }
 
-/** A colour that shows on the ground of the page. */
-function shown(colours, [r, g, b]) {
-  if (colours.isDark) {
-    const lift = (v) => Math.round(56 + (v * 199) / 255);
-    return `rgb(${lift(r)} ${lift(g)} ${lift(b)})`;
-  }
-  const dim = (v) => Math.round(v * 0.82);
-  return `rgb(${dim(r)} ${dim(g)} ${dim(b)})`;
+/** A colour that shows on the ground of the page: no darker than that, or no lighter. */
+function shown(colours, rgb) {
+  const scale = colours.isDark ? Math.max(1, 125 / Math.max(1, ...rgb)) : 0.78;
+  return `rgb(${Array.from(rgb, (v) => Math.round(v * scale)).join(" ")})`;
 }
 
 function colourOf(colours, bytes, index) {
@@ -142,15 +138,20 @@ export function curvesPanel(canvas, { draws, model }) {
   const y = limits(kind, extent(draws.spectra));
   const frame = axes(canvas, { x: ends(wavelengths), y, xLabel: WAVELENGTH, yLabel: label(kind) });
   const { context, colours } = frame;
-  context.lineWidth = 1.15;
-  context.globalAlpha = 0.85;
+  context.lineWidth = 1.25;
   within(frame, () => {
     for (let i = 0; i * wavelengths.length < draws.spectra.length; i++) {
       context.strokeStyle = colourOf(colours, draws.colours, i);
       curve(frame, wavelengths, draws.spectra, i * wavelengths.length);
     }
   });
-  context.globalAlpha = 1;
+}
+
+/** Columns of chips that fill a block of this aspect without a gap, and are about square. */
+function columnsOf(count, aspect) {
+  const misfit = (columns) => Math.abs(Math.log((columns * columns) / (count * aspect)));
+  const full = Array.from({ length: count }, (_, i) => i + 1).filter((columns) => count % columns === 0);
+  return full.reduce((best, columns) => (misfit(columns) < misfit(best) ? columns : best), 1);
 }
 
 /** The same draws as chips, as they look under the illuminant. */
@@ -163,9 +164,8 @@ export function chipsPanel(canvas, { draws }) {
     context.fillText("These wavelengths have no light that the eye sees.", 8, 24);
     return;
   }
-  const columns = Math.max(1, Math.round(Math.sqrt((count * width) / height)));
-  const rows = Math.ceil(count / columns);
-  const [w, h] = [width / columns, height / rows];
+  const columns = columnsOf(count, width / height);
+  const [w, h] = [width / columns, height / Math.ceil(count / columns)];
   for (let i = 0; i < count; i++) {
     const [r, g, b] = draws.colours.subarray(3 * i, 3 * i + 3);
     context.fillStyle = `rgb(${r} ${g} ${b})`;
@@ -192,11 +192,6 @@ export function chromaticityPanel(canvas, { draws, model, locus }) {
     const [cx, cy] = [(even[0] + even[1]) / 2, (odd[0] + odd[1]) / 2];
     x = [Math.max(0, cx - room), Math.min(0.75, cx + room)];
     y = [Math.max(0, cy - room), Math.min(0.85, cy + room)];
-  } else if (points.some((p) => p.length > 0)) {
-    [x, y] = [
-      [0.05, 0.65],
-      [0.05, 0.65],
-    ];
   }
   const frame = axes(canvas, { x, y, xLabel: "x", yLabel: "y", square: true });
   const { context, px, py } = frame;
@@ -237,7 +232,12 @@ export function chromaticityPanel(canvas, { draws, model, locus }) {
   context.textAlign = "left";
   context.textBaseline = "middle";
   const white = locus.length - 2;
-  context.fillText("D65", px(locus[white]) + 9, py(locus[white + 1]) - 9);
+  context.strokeStyle = colours.ground;
+  context.lineWidth = 3;
+  context.lineJoin = "round";
+  const at = [px(locus[white]) + 8, py(locus[white + 1]) - 10];
+  context.strokeText("D65", ...at);
+  context.fillText("D65", ...at);
 }
 
 /** Metamers as curves, in the colour that they share. */
@@ -269,9 +269,8 @@ export function metamerChipsPanel(canvas, { metamers }) {
     context.fillStyle = ink;
     context.fillText(name, left, 0);
     const count = colours.length / 3;
-    const columns = Math.max(1, Math.round(Math.sqrt((count * block) / (height - top))));
-    const rows = Math.ceil(count / columns);
-    const [w, h] = [block / columns, (height - top) / rows];
+    const columns = columnsOf(count, block / (height - top));
+    const [w, h] = [block / columns, (height - top) / Math.ceil(count / columns)];
     for (let i = 0; i < count; i++) {
       context.fillStyle = `rgb(${colours.subarray(3 * i, 3 * i + 3).join(" ")})`;
       const [x, y] = [left + (i % columns) * w, top + Math.floor(i / columns) * h];
