@@ -50,7 +50,11 @@ def main():
             Page.files[name] = TYPES[path.suffix], gzip.compress(path.read_bytes(), 9)
     if "/index.html" not in Page.files:
         sys.exit(f"{root} holds no page: make web builds it")
-    with http.server.ThreadingHTTPServer(("127.0.0.1", port), Page) as server:
+    try:
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Page)
+    except OSError as error:
+        sys.exit(f"port {port}: {error.strerror}; choose another, as in: make web PORT={port + 1}")
+    with server:
         print(f"http://127.0.0.1:{server.server_address[1]}/", flush=True)
         try:
             server.serve_forever()

@@ -72,26 +72,14 @@ pub fn builtins() -> String {
         spectra: usize,
         first_nm: f64,
         last_nm: f64,
-        wavelengths: String,
     }
     // A name with a grid in it is another model of the same data, which the page has another control for.
     let names = Model::BUILTIN.iter().filter(|name| !name.ends_with("nm"));
-    let row = |name: &&'static str| {
+    let row = |name: &'static str| {
         let data = Model::builtin_data(name).expect("it is built in");
-        let wavelengths = match *name {
-            "krinov" => "400:10:650",
-            _ => "400:10:700",
-        };
-        Row {
-            name,
-            kind: data.kind,
-            spectra: data.spectra,
-            first_nm: data.first,
-            last_nm: data.last,
-            wavelengths: wavelengths.to_owned(),
-        }
+        Row { name, kind: data.kind, spectra: data.spectra, first_nm: data.first, last_nm: data.last }
     };
-    serde_json::to_string(&names.map(row).collect::<Vec<_>>()).expect("numbers and text are JSON")
+    serde_json::to_string(&names.copied().map(row).collect::<Vec<_>>()).expect("numbers and text are JSON")
 }
 
 #[wasm_bindgen]
@@ -99,7 +87,7 @@ impl Data {
     /// The data of a built-in model.
     pub fn builtin(name: &str) -> Result<Data, Refusal> {
         let data = Model::builtin_data(name).map_err(Refusal::new)?;
-        let name = Model::BUILTIN.iter().find(|known| **known == name).expect("it has data");
+        let name = *Model::BUILTIN.iter().find(|known| **known == name).expect("it has data");
         let tables = data.tables.iter().map(|table| table.table()).collect();
         Ok(Data {
             origin: Origin::Builtin(name),
@@ -126,7 +114,7 @@ impl Data {
     /// Facts about the data as JSON.
     pub fn facts(&self) -> String {
         let name = match &self.origin {
-            Origin::Builtin(name) => name,
+            Origin::Builtin(name) => *name,
             Origin::File(name, _) => name.as_str(),
         };
         let ends = |pick: fn(&[f64]) -> f64| self.tables.iter().map(move |table| pick(table.wavelengths()));

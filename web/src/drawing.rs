@@ -77,7 +77,7 @@ impl Drawing {
             Engine::with_threads(&EngineChoice::Cpu, Some(NonZeroUsize::MIN)).map_err(Refusal::new)?;
         let mut session = engine.session(&self.recipe).map_err(Refusal::new)?;
         let mut slices: Vec<_> =
-            arrays.iter_mut().map(|(_, words)| bytemuck::cast_slice_mut(words.as_mut_slice())).collect();
+            arrays.iter_mut().map(|(_, words)| bytemuck::cast_slice_mut::<u32, u8>(words)).collect();
         let summary = session.fill_arrays(draws, &mut slices).map_err(Refusal::new)?;
         Ok(Drawn { arrays, summary })
     }

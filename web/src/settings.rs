@@ -1,7 +1,7 @@
 //! Settings of the page, as its scripts hand them over.
 
 use serde::Deserialize;
-use spectroll::{Dtype, Missing, ReadOptions, SpectrumKind, TableLayout, WavelengthUnit};
+use spectroll::{Dtype, GridError, Missing, ReadOptions, SpectrumKind, TableLayout, WavelengthUnit};
 
 use crate::refusal::Refusal;
 
@@ -50,7 +50,7 @@ pub(crate) fn parse<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, Refusal>
 
 /// Wavelengths as they are typed.
 pub(crate) fn grid(text: &str, control: &'static str) -> Result<spectroll::Grid, Refusal> {
-    let refused = |e| Refusal {
+    let refused = |e: GridError| Refusal {
         control: Some(control),
         ..Refusal::new(format_args!("{text:?} are no wavelengths: {e}, as in 400:10:700"))
     };
