@@ -55,8 +55,8 @@ export async function ready(page) {
 export async function go(page, hash) {
   await page.evaluate((hash) => {
     document.body.dataset.state = "asked";
-    if (location.hash === hash) window.dispatchEvent(new HashChangeEvent("hashchange"));
-    else location.hash = hash;
+    history.replaceState(null, "", hash);
+    window.dispatchEvent(new HashChangeEvent("hashchange"));
   }, hash);
   await ready(page);
 }
