@@ -40,10 +40,12 @@ fn a_hangup_that_is_ignored_stays_ignored() {
     let folder = tempfile::tempdir().unwrap();
     let run = |trap: &str| {
         let script = format!(
-            "{trap}; {} sample granada -n 3e7 --engine cpu -t 1 -q -o a.npy --force & sleep 0.4; kill -HUP $!; wait $!",
-            PROGRAM
+            "{trap}; {PROGRAM} sample granada -n 3e7 --engine cpu -t 1 -q -o a.npy & \
+             while [ -z \"$(ls -A)\" ]; do sleep 0.02; done; kill -HUP $!; wait $!"
         );
-        Command::new("sh").arg("-c").arg(script).current_dir(folder.path()).output().unwrap()
+        // Whoever started the tests may have it ignored, which a shell cannot take back.
+        let shell = ["--default-signal=HUP", "sh", "-c", &script];
+        Command::new("env").args(shell).current_dir(folder.path()).output().unwrap()
     };
     assert_eq!(run("true").status.code(), Some(130));
     assert!(files(folder.path()).is_empty());

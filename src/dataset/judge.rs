@@ -22,6 +22,9 @@ const MIN_POWER: f64 = -0.25;
 /// stays below.
 const DARKEST: f64 = 0.012;
 
+/// Range of wavelengths over which that can be told, in nm.
+const BROAD_NM: f64 = 100.0;
+
 /// Ratio to the rest of a spectrum from which a number by which the field marks is a marker, a negative number, and any
 /// other.
 const RATIOS: [f64; 3] = [2.0, 4.0, 1000.0];
@@ -299,7 +302,9 @@ impl Dataset {
                 return Err(self.unphysical(j, 0, reason, Remedy::None));
             }
         }
-        let dark = tops.iter().position(|top| *top <= DARKEST);
+        // Over a few wavelengths a surface may well be dark.
+        let is_broad = self.grid.last() - self.grid.first() >= BROAD_NM;
+        let dark = tops.iter().position(|top| *top <= DARKEST).filter(|_| is_broad);
         tops.sort_unstable_by(f64::total_cmp);
         if let Some(dark) = dark.filter(|_| tops[tops.len() / 2] >= 0.2) {
             let high = self.spectra.column(dark).imax();
