@@ -34,9 +34,9 @@ test-python: driver python
 # The page, served on this machine alone: its address is printed. PORT picks the port.
 PORT ?= 8000
 web: web-build
-	python3 web/serve.py target/web $(PORT)
+	python3 web/serve.py target/page $(PORT)
 
-# The page as files, in target/web.
+# The page as files, in target/page.
 web-build:
 	@bash web/build.sh
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Builds the page into target/web: the library as WebAssembly, with its glue, and the files of web/page as they are.
+# Builds the page into target/page: the library as WebAssembly, with its glue, and the files of web/page as they are.
 # Takes rustup's wasm32 target where it is there or can be fetched, else Debian's compiler for the web (rustc-web), which
 # builds its own standard library.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-out=target/web
+out=target/page
 target=wasm32-unknown-unknown
 module=target/$target/web/spectroll_web.wasm
 # Every browser that has WebGPU, and all others of this decade, have 128-bit vectors. One panic ends one worker.

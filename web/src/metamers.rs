@@ -59,7 +59,7 @@ impl Fitted {
         let xyz = [0, 1, 2].map(|i| responses[i] * white[i]);
         let recipe =
             Recipe::builder(&self.model).xyz(xyz).quantities([Quantity::Spectra, Quantity::Attempts]);
-        let drawing = Drawing::of(recipe.build()).map_err(|refusal| refusal.of_colour())?;
+        let drawing = Drawing::of(recipe.build()).map_err(Refusal::of_colour)?;
         let drawn = drawing.draw_range(Stream::new(seed).draws(0..count.into()))?;
         let spectra = drawn.values(Quantity::Spectra.name());
         let colours = LIGHTS.map(|(_, light)| self.colours_under(&light, &spectra));

@@ -8,8 +8,8 @@ import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 
 export const ROOT = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
-export const BUILT = join(ROOT, "target/web");
-export const SHOTS = join(ROOT, "target/web-pictures");
+export const BUILT = join(ROOT, "target/page");
+export const SHOTS = join(ROOT, "target/page-pictures");
 export const PROGRAM = process.env.SPECTROLL ?? join(ROOT, "target/release/spectroll");
 const BROWSER = process.env.CHROMIUM ?? ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
 
