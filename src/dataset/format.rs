@@ -43,7 +43,11 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
 }
 
 /// Reads the bytes of a file; `path` is what messages call it, and where files are looked for that belong to it.
-pub(super) fn from_bytes(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Reading, DatasetError> {
+pub(super) fn from_bytes(
+    path: &Path,
+    bytes: Vec<u8>,
+    options: &ReadOptions,
+) -> Result<Reading, DatasetError> {
     if is_hdf5(&bytes) {
         return choose(path, hdf5_bytes(path, bytes)?, options);
     }
