@@ -1,5 +1,6 @@
 # Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
-.PHONY: demo test test-swiftshader test-python web web-build web-test wheel notebook exhaustive faults fuzz mutants bench driver python
+.PHONY: demo test test-swiftshader test-python web web-build web-test wheel notebook exhaustive faults fuzz mutants bench
+.PHONY: adapter driver python
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
@@ -17,11 +18,13 @@ demo:
 test: driver python
 	cargo test --locked --release
 
-# The tests that hold an adapter against the CPU, on a second software Vulkan with a compiler of its own.
+# The tests that hold an adapter against the CPU, on a second software Vulkan with a compiler of its own. It draws slowly:
+# `make test-swiftshader SWIFTSHADER_TESTS="lists twins"` has the longest of them.
+SWIFTSHADER_TESTS ?= quantities cover scene embedding guests
 SWIFTSHADER := target/swiftshader/vk_swiftshader_icd.json
 test-swiftshader: driver $(SWIFTSHADER)
 	VK_DRIVER_FILES=$(abspath $(SWIFTSHADER)) VK_ICD_FILENAMES=$(abspath $(SWIFTSHADER)) cargo test --locked --release \
-		--test twins --test quantities --test cover --test lists --test scene --test embedding --test guests
+		$(addprefix --test ,$(SWIFTSHADER_TESTS))
 
 $(SWIFTSHADER): scripts/swiftshader.sh
 	@sh scripts/swiftshader.sh $(dir $@)
@@ -57,10 +60,10 @@ notebook:
 	target/wheel/venv/bin/python scripts/notebook.py
 
 # What takes minutes: all 2^32 words through the radius and the circle, the statistics under 200 seeds, and the fit on
-# 100,000 matrices and 1,000 small files, a million draws of each kind on devices that take every liberty, and draws on
-# clusters of Dask and Ray.
+# 100,000 matrices and 1,000 small files, a million draws of each kind on devices that take every liberty, a cube of colours,
+# and draws on clusters of Dask and Ray.
 exhaustive: python
-	cargo test --locked --release --lib --test statistics --test fit --test adversary -- --ignored --nocapture
+	cargo test --locked --release --lib --test statistics --test fit --test adversary --test metamers -- --ignored --nocapture
 	test -d target/wheel/venv || $(MAKE) test-python
 	target/wheel/venv/bin/python -m pip install --quiet -r python/tests/requirements-slow.txt
 	target/wheel/venv/bin/python -m pytest -q -m slow
@@ -99,6 +102,13 @@ bench: driver python
 	cargo build --locked --release
 	$(SPECTROLL_PYTHON) -m pip install --quiet numba
 	$(SPECTROLL_PYTHON) scripts/bench.py
+
+# What a new adapter owes, of the number or with the name in ADAPTER: a report, and rows for docs/measurements.md.
+ADAPTER ?= 0
+adapter: driver
+	cargo build --locked --release
+	target/release/spectroll report --adapter '$(ADAPTER)' -o target/adapter --force
+	@cat target/adapter/adapter.md
 
 # A Vulkan driver: Mesa's software one where there is none.
 driver:

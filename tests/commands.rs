@@ -248,8 +248,10 @@ fn left(words: &[String]) -> Result<(), String> {
     let is_there = match words[0].as_str() {
         "make" => {
             let makefile = fs::read_to_string(root().join("Makefile")).map_err(|e| e.to_string())?;
+            // What has a `=` sets a variable.
             words[1..]
                 .iter()
+                .filter(|word| !word.contains('='))
                 .all(|target| makefile.lines().any(|line| line.starts_with(&format!("{target}:"))))
         }
         _ => after("--example").is_none_or(|name| root().join(format!("examples/{name}.rs")).exists()),

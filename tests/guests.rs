@@ -6,7 +6,7 @@ use buffers::read;
 use spectroll::{
     Arithmetic, ArithmeticTrait, BindingRole, Bounds, ComputeShader, Engine, Indexing, Layout, Model,
     PrepareOptions, Prepared, Probe, Quantity, Recipe, RecipeBuilder, Sampler, SamplerError, SamplerOptions,
-    ShaderVariant, Stream,
+    Sensors, ShaderVariant, Stream,
     wgpu::{self, BufferUsages},
 };
 
@@ -212,5 +212,45 @@ fn a_device_is_probed() {
     assert!(probe.traits.iter().all(|(found, cases)| !impossible.contains(found) && *cases <= Probe::CASES));
     if device.adapter_info().device_type == wgpu::DeviceType::Cpu {
         assert!(probe.verdict.is_exact);
+    }
+}
+
+/// Responses that a host's own passes might have written, at an offset of its buffer.
+#[test]
+fn draws_are_given_the_colours_of_a_hosts_buffer() {
+    let host = host::device();
+    let eye = Sensors::builtin("cie1931").expect("it is built in");
+    let recipe = builder().given(eye).build().expect("it can be drawn");
+    let sampler = Sampler::new(&host.0, &recipe).expect("two buffers are few");
+    let draws = Stream::new(8).draws(0..100);
+    let error = sampler.prepare(&host.0, draws).unwrap_err();
+    assert_eq!(error, SamplerError::NothingGiven { responses: 3 });
+    let colours: Vec<f32> = (0..300).map(|i| 0.3 + 0.0002 * i as f32).collect();
+    let buffer = host.0.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: 256 + 1200,
+        usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    host.1.write_buffer(&buffer, 256, bytemuck::cast_slice(&colours));
+    let part = |offset| wgpu::BufferBinding { buffer: &buffer, offset, size: None };
+    let options = |offset| PrepareOptions { given: Some(part(offset)), ..PrepareOptions::default() };
+    let error = sampler.prepare_with(&host.0, draws, &options(512)).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "the responses that 100 draws are given need 1200 bytes from offset 512 on, and the buffer has 944 there: bind more \
+         of it"
+    );
+    let prepared = sampler.prepare_with(&host.0, draws, &options(256)).expect("there is room");
+    let mut encoder = host.0.create_command_encoder(&Default::default());
+    prepared.record(&mut encoder);
+    let words =
+        read(&host, encoder, &[prepared.buffer(Quantity::Spectra).expect("it is asked for")]).remove(0);
+    let scalar = recipe.scalar_sampler::<f32>();
+    for (i, (row, colour)) in words.chunks_exact(31).zip(colours.chunks_exact(3)).enumerate() {
+        let drawn = scalar.draw_given(draws.stream, i as u64, colour);
+        assert!(drawn.status().attempts() > 0);
+        let close = |(a, b): (&u32, &f32)| (f32::from_bits(*a) - b).abs() < 1e-6;
+        assert!(row.iter().zip(drawn.spectrum()).all(close), "draw {i}");
     }
 }

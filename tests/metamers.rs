@@ -8,12 +8,11 @@ mod program;
 mod texture;
 
 use engines::{cpu, gpu, gpu_is_software};
-use program::{fails, python, succeeds};
+use program::{fails, python, script, succeeds};
 use spectroll::nalgebra::{DMatrix, DVector};
 use spectroll::{
     Answer, AnswerCounts, Draws, Dtype, Engine, EngineError, Grid, HardColours, Illuminant, MetamerError,
-    Metamers, Model, Observer, Quantity, Recipe, RecipeBuilder, Sensors, Stream, UnreachableColours,
-    colorimetry,
+    Metamers, Model, Quantity, Recipe, RecipeBuilder, Sensors, Stream, UnreachableColours, colorimetry,
 };
 
 /// The largest difference of a response from the one that was given, relative to white.
@@ -706,5 +705,32 @@ fn metamers_per_second() {
             println!("{name}: {:.1} million a second", count as f64 / start.elapsed().as_secs_f64() / 1e6);
         }
     }
-    let _ = Observer::Cie1931;
+}
+
+/// Each texel's spectrum has its colour, and is the one that the CPU draws for that pixel.
+#[test]
+fn a_shader_turns_texels_into_the_spectra_of_the_cpu() {
+    let (recipe, width) = (texture::recipe(), 64);
+    let texels = texture::texture(width, 48);
+    let shaded = texture::shade(&recipe, &texels, width);
+    let scalar = recipe.scalar_sampler::<f32>();
+    let stream = Stream::new(texture::SEED);
+    for (i, (shaded, texel)) in shaded.iter().zip(&texels).enumerate() {
+        let (x, y) = (i as u64 % u64::from(width), i as u64 / u64::from(width));
+        let drawn = scalar.draw_given(stream, y << 32 | x, &texel[..3]);
+        let xyz = drawn.values(Quantity::Xyz);
+        let expected = [xyz[0], xyz[1], xyz[2], drawn.status().attempts() as f32];
+        match gpu_is_software() {
+            true => assert_eq!(*shaded, expected, "{x}, {y}"),
+            false => assert!(shaded.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{x}, {y}"),
+        }
+        assert!(shaded[3] > 0.0, "{x}, {y}");
+    }
+}
+
+/// The same colours by other methods: what they are asked for, they have less exactly.
+#[test]
+fn spectra_of_colours_beside_other_methods() {
+    let folder = tempfile::tempdir().expect("there is a place for temporary files");
+    println!("{}", script(folder.path(), "recovery", ", 200, 2"));
 }

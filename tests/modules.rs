@@ -183,7 +183,7 @@ fn a_host_draws_what_the_cpu_draws() {
 fn any_recipe(rng: &mut StreamRng) -> Option<RecipeBuilder> {
     let grids = ["400:10:700", "400:5:700", "400:1:700", "390:33:720", "450,455,500,640"];
     let grid: Grid = grids[rng.random_range(0..grids.len())].parse().expect("a grid");
-    let components = rng.random_range(1..=grid.len().min(12));
+    let components = rng.random_range(1..=grid.len().min(6));
     let is_light = rng.random_bool(0.3);
     let name = if is_light { "granada" } else { "munsell-vrhel" };
     let mut builder = Recipe::builder(&Model::builtin_with(name, grid, components).ok()?)
@@ -223,7 +223,7 @@ fn any_recipe(rng: &mut StreamRng) -> Option<RecipeBuilder> {
 fn no_recipe_that_can_be_drawn_is_refused() {
     let mut rng = Stream::named(20, "recipes").rng();
     let mut texts = 0;
-    for trial in 0..60 {
+    for trial in 0..30 {
         let Some(recipe) = any_recipe(&mut rng).and_then(|builder| builder.build().ok()) else { continue };
         for arithmetic in [Arithmetic::Plain, Arithmetic::Exact] {
             for tables in [None, Some(TableStorage::Const), Some(BUFFER)] {
@@ -243,5 +243,5 @@ fn no_recipe_that_can_be_drawn_is_refused() {
         }
     }
     println!("{texts} texts");
-    assert!(texts > 100, "{texts} texts");
+    assert!(texts > 50, "{texts} texts");
 }

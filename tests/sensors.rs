@@ -4,7 +4,7 @@ mod engines;
 mod program;
 
 use engines::{cpu, gpu, gpu_is_software, lights, surfaces};
-use program::{fails, python, succeeds};
+use program::{fails, python, script, succeeds};
 use spectroll::{
     Engine, EngineError, Illuminant, Model, Observer, Quantity, Recipe, RecipeBuilder, ResponseScale,
     ResponseTarget, Sensors, Stream,
@@ -14,17 +14,7 @@ use spectroll::{
 #[test]
 fn responses_are_those_of_numpy_and_colour_science() {
     let folder = tempfile::tempdir().expect("there is a place for temporary files");
-    let [tests, data] = ["tests", "data"].map(|name| format!("{}/{name}", env!("CARGO_MANIFEST_DIR")));
-    let code = format!(
-        "import sys, warnings\n\
-         warnings.simplefilter('ignore')\n\
-         sys.dont_write_bytecode = True\n\
-         sys.path.insert(0, {tests:?})\n\
-         import sensors\n\
-         sensors.main({:?}, {data:?})",
-        program::PROGRAM
-    );
-    println!("{}", python(folder.path(), &code));
+    println!("{}", script(folder.path(), "sensors", ""));
 }
 
 fn cones() -> Sensors {

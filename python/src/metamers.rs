@@ -12,6 +12,9 @@ use crate::error::{Result, check_signals, value};
 use crate::model::{Model, choice};
 use crate::sampler::{EngineRequest, Request};
 
+/// Kind of the answer to each colour, and the distance of it.
+type Answers<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f32>>);
+
 /// Draws spectra of colours into an array of f32: `each` of every colour, or the most probable one where that is 0. `given`
 /// are sensors as JSON, where colours are responses of these. Returns the kind of the answer to each, and its distance.
 #[pyfunction]
@@ -26,7 +29,7 @@ pub(crate) fn metamers<'py>(
     answers: (&str, bool),
     engine: Request,
     mut spectra: PyReadwriteArray1<'py, f32>,
-) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f32>>)> {
+) -> PyResult<Answers<'py>> {
     let settings: RecipeSettings = serde_json::from_str(settings).map_err(value)?;
     let all = [("mode", HardColours::Mode), ("skip", HardColours::Skip), ("error", HardColours::Error)];
     let hard = choice("hard", answers.0, &all)?;

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use spectroll::{Illuminant, SensorError, Sensors, Table};
 
-use crate::error::{Error, Result, value};
+use crate::error::{Result, value};
 
 /// The set of a name: a built-in one, or that of a file.
 #[pyfunction]
@@ -38,7 +38,7 @@ pub(crate) fn sensors_of(text: &str) -> PyResult<String> {
 /// The illuminant of a name or of a temperature.
 #[pyfunction]
 pub(crate) fn illuminant(name: &str) -> PyResult<String> {
-    let found = Illuminant::named(name).map_err(|error| Error::from(value(format!("illuminant={error}"))))?;
+    let found = Illuminant::named(name).map_err(|error| value(format!("illuminant={error}")))?;
     Ok(serde_json::to_string(&found).map_err(value)?)
 }
 

@@ -1,12 +1,14 @@
 """What the tests share: the program of the same wheel, and engines to draw with."""
 
 import os
+import signal
 import subprocess
 import sys
 
 import pytest
 
 os.environ.setdefault("XDG_RUNTIME_DIR", "/tmp")  # Mesa's driver complains where it is unset
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell has it ignored for what it starts with "&"
 
 
 @pytest.fixture

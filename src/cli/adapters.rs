@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for (index, (adapter, probe)) in adapters.iter().enumerate() {
         writeln!(out, "{index}: {adapter}")?;
         match probe {
-            Ok(probe) => writeln!(out, "   {}", sentence(probe))?,
+            Ok(probe) => writeln!(out, "   {probe}")?,
             Err(error) => writeln!(out, "   cannot be tried: {error}")?,
         }
     }
@@ -52,13 +52,4 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     writeln!(out, "-: CPU, with --engine cpu")?;
     Ok(())
-}
-
-/// The verdict on an adapter, and the traits of its arithmetic.
-fn sentence(probe: &Probe) -> String {
-    let traits: Vec<_> = probe.traits.iter().map(|(found, _)| found.name()).collect();
-    match traits.is_empty() {
-        true => probe.verdict.to_string(),
-        false => format!("{} ({})", probe.verdict, traits.join(", ")),
-    }
 }

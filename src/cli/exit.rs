@@ -140,6 +140,7 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
     if let Some(error) = error.downcast_ref::<FitError>() {
         return match error {
             FitError::Power { .. } => " (--normalize none)",
+            FitError::TooFewSpectra { spectra: ..=1, .. } => "",
             FitError::TooFewSpectra { .. }
             | FitError::Rank { .. }
             | FitError::Components(_)

@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use spectroll::evaluation::adapter::{self, AdapterError};
 use spectroll::evaluation::report::{
     Effort, Options, Progress, Report, ReportError, Verdict, figures, measure, page,
 };
@@ -21,7 +22,8 @@ use super::{if_exists, model};
 /// Measure error against run time, accuracy, randomness and extreme cases, as a page with plots
 ///
 /// Writes a folder: report.html, which needs nothing else, report.json with all numbers, and the plots as SVG. Ctrl-C
-/// writes what is done by then, marked as unfinished; a second Ctrl-C ends at once.
+/// writes what is done by then, marked as unfinished; a second Ctrl-C ends at once. With --adapter there are also adapter.json
+/// and adapter.md: draws of every kind beside those of the CPU, costs, and the bandwidth that draws reach.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// Model files, or names of built-in models
@@ -85,6 +87,21 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let folder = folder()?;
     write(&folder, &report)?;
+    if let (Some(choice @ EngineChoice::Adapter(_)), true) = (arguments.engine.choice(), report.finished) {
+        let watch = |step: &str| {
+            if !arguments.quiet {
+                tell!("the adapter: {step}");
+            }
+            interrupt::check().is_ok()
+        };
+        let measured = adapter::measure(&choice, &watch).map_err(|error| match error {
+            AdapterError::Stopped => Interrupted("nothing was left behind".to_owned()).into(),
+            AdapterError::Engine(e) => e.into(), // with its exit code
+            other => anyhow::Error::from(other),
+        })?;
+        folder.write("adapter.json", serde_json::to_string_pretty(&measured)?.as_bytes())?;
+        folder.write("adapter.md", adapter::rows(&measured).as_bytes())?;
+    }
     folder.finish()?;
     if !report.finished {
         let kept = format!("{} is unfinished: it has {measured} of {all} sections", path.display());

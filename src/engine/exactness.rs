@@ -30,6 +30,9 @@ const TRIAL_DRAWS: u64 = 65_536;
 /// Products that the CPU forms in a trial, at most: a tenth of a second on one core.
 const TRIAL_PRODUCTS: f64 = (1u64 << 28) as f64;
 
+/// Divisor of both on a software adapter: there are few, which tests try at length, and they draw slowly.
+const SOFTWARE: u64 = 8;
+
 /// Choice of the arithmetic in which a device draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
@@ -130,11 +133,12 @@ fn sum(shader: &ComputeShader) -> blake3::Hash {
     hasher.finalize()
 }
 
-/// Number of draws in the trial of a recipe: fewer where one takes very many products.
-fn trial_draws(recipe: &Recipe) -> u64 {
+/// Number of draws in the trial of a recipe: fewer where one takes very many products, and on a software adapter.
+fn trial_draws(recipe: &Recipe, is_software: bool) -> u64 {
     let program = recipe.program();
     let products = (program.bands() * program.components()) as f64 / recipe.acceptance();
-    ((TRIAL_PRODUCTS / products) as u64).clamp(4, TRIAL_DRAWS) / 4 * 4
+    let divisor = if is_software { SOFTWARE } else { 1 };
+    ((TRIAL_PRODUCTS / products) as u64 / divisor).clamp(4, TRIAL_DRAWS / divisor) / 4 * 4
 }
 
 /// Responses that the draws of a trial are given, where a recipe gives them any: about those of the model's mean spectrum,
@@ -153,7 +157,7 @@ fn trial(gpu: &Gpu, recipe: &Recipe, sampler: &Sampler, indexing: Indexing) -> R
     let job = Job { recipe, per_step: 1 };
     let mut schedule = GpuSchedule::of_samplers(gpu, &[job], vec![sampler.clone()])?;
     let reference = Reference::new(recipe);
-    let count = trial_draws(recipe);
+    let count = trial_draws(recipe, gpu.adapter().kind == "software");
     let stream = Stream::named(0, "trial");
     let indices: Vec<u64> = (0..count).collect();
     let draws: Draws = match indexing {
@@ -191,6 +195,16 @@ pub struct Probe {
 impl Probe {
     /// Number of cases of each trait.
     pub const CASES: u32 = CASES;
+}
+
+impl fmt::Display for Probe {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let traits: Vec<_> = self.traits.iter().map(|(found, _)| found.name()).collect();
+        match traits.is_empty() {
+            true => write!(f, "{}", self.verdict),
+            false => write!(f, "{} ({})", self.verdict, traits.join(", ")),
+        }
+    }
 }
 
 /// Tries the arithmetic of a host's device: a self-test in one dispatch, and draws of a built-in model in the plain and,
@@ -284,10 +298,11 @@ mod tests {
     #[test]
     fn hard_recipes_have_short_trials() {
         let model = Model::builtin("munsell-vrhel").unwrap();
-        assert_eq!(trial_draws(&Recipe::builder(&model).build().unwrap()), TRIAL_DRAWS);
+        let plain = Recipe::builder(&model).build().unwrap();
+        assert_eq!([trial_draws(&plain, false), trial_draws(&plain, true)], [TRIAL_DRAWS, TRIAL_DRAWS / 8]);
         let hard = Recipe::builder(&model).covariance_scale(100.0).max_attempts(1 << 20);
         let hard = hard.proposal(crate::recipe::ProposalKind::Plain).build().unwrap();
-        assert!((4..10_000).contains(&trial_draws(&hard)));
+        assert!((4..10_000).contains(&trial_draws(&hard, false)));
     }
 
     /// A pipeline whose text lacks one operation is found out, and the other form is taken.

@@ -2,6 +2,7 @@
 //!
 //! Not for users of the library: nothing here is kept stable.
 
+pub mod adapter;
 pub mod comparison;
 pub mod costs;
 pub mod plot;

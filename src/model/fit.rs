@@ -44,9 +44,10 @@ pub enum FitError {
     #[error("a share of the variance of {0}: it must be above 0 and at most 1")]
     Share(f64),
     #[error(
-        "a fit of {} takes at least {} spectra, and the data have {spectra}: ask for fewer",
+        "a fit of {} takes at least {} spectra, and the data have {spectra}: {}",
         counted(*components as u64, "component", "components"),
-        components + 1
+        components + 1,
+        if *spectra > 1 { "ask for fewer" } else { "give more files, all at once" }
     )]
     TooFewSpectra { components: usize, spectra: usize },
     #[error("all {spectra} spectra are identical: there is no variation to model")]

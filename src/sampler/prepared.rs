@@ -62,7 +62,8 @@ impl Prepared {
         (0..self.sampler.slices()).for_each(|_| pass.dispatch_workgroups_indirect(workgroups, offset));
     }
 
-    fn bind(&self, pass: &mut wgpu::ComputePass) {
+    /// Sets the pipeline and the bind group.
+    pub(crate) fn bind(&self, pass: &mut wgpu::ComputePass) {
         pass.set_pipeline(&self.sampler.pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
     }

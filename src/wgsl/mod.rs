@@ -277,6 +277,9 @@ mod tests {
             }
             let targets = laws.into_iter().flat_map(|law| rules.map(|bounds| Some((law, bounds))));
             programs.extend([None].into_iter().chain(targets).map(|t| of(SpectrumKind::Reflectance, t)));
+            if components > 1 {
+                programs.push(Program { given: components / 2, ..of(SpectrumKind::Reflectance, None) });
+            }
         }
         let layouts = [Layout::Rows, Layout::PaddedRows, Layout::Planes];
         let all = programs.clone().into_iter().flat_map(|program| {
@@ -290,20 +293,21 @@ mod tests {
 
     #[test]
     fn every_variant_is_valid_with_no_more_than_it_says() {
-        for program in programs() {
-            for (target, needs) in [
-                (Dialect::Baseline, Capabilities::empty()),
-                (Dialect::Int64, Capabilities::SHADER_INT64),
-                (Dialect::SoftwareInt64, Capabilities::SHADER_INT64),
-            ] {
-                for (indexing, arithmetic) in VARIANTS {
-                    let variant = ShaderVariant { dialect: target, indexing, arithmetic };
-                    let (text, _) = shader_of(&program, variant);
-                    if let Err(e) = validate(&text, needs) {
-                        panic!("{variant:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
-                    }
-                    assert!(!text.contains("//!") && !text.contains("src/"), "notes for us: {text}");
+        let targets = [
+            (Dialect::Baseline, Capabilities::empty()),
+            (Dialect::Int64, Capabilities::SHADER_INT64),
+            (Dialect::SoftwareInt64, Capabilities::SHADER_INT64),
+        ];
+        for (number, program) in programs().into_iter().enumerate() {
+            for (i, (target, needs)) in targets.into_iter().enumerate() {
+                // Each form with each dialect, but not of every program: there are hundreds.
+                let (indexing, arithmetic) = VARIANTS[(number + i) % 2];
+                let variant = ShaderVariant { dialect: target, indexing, arithmetic };
+                let (text, _) = shader_of(&program, variant);
+                if let Err(e) = validate(&text, needs) {
+                    panic!("{variant:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
                 }
+                assert!(!text.contains("//!") && !text.contains("src/"), "notes for us: {text}");
             }
         }
     }
@@ -380,6 +384,7 @@ mod tests {
             ("xyz_of_illuminant", only(light(), Quantity::Xyz), Dialect::Baseline),
             ("chromaticity", chromaticity(lamp()), Dialect::Baseline),
             ("attempts", only(surface(None), Quantity::Attempts), Dialect::Baseline),
+            ("given", Program { given: 1, ..surface(None) }, Dialect::Baseline),
             ("lrv_base", lrv(Bounds::Base), Dialect::Baseline),
             ("lrv_scaled", lrv(Bounds::Scaled), Dialect::Baseline),
             ("lrv_both_in_pairs", lrv(Bounds::Both), Dialect::SoftwareInt64),
@@ -415,6 +420,12 @@ mod tests {
         ] {
             insta::assert_snapshot!(name, generated(&large(law, layout, spectra), Dialect::Int64));
         }
+        // All that differs where draws are given responses.
+        let given = Program { given: 1, ..surface(None) };
+        let lines = |program: &Program| shader(program, Dialect::Baseline).0;
+        let (plain, given) = (lines(&surface(None)), lines(&given));
+        let added: Vec<&str> = given.lines().filter(|line| !plain.contains(line)).collect();
+        insta::assert_snapshot!("added_where_responses_are_given", added.join("\n"));
     }
 
     #[test]

@@ -13,9 +13,9 @@ use lint::findings;
 use machine::{Liberties, Machine};
 use rayon::prelude::*;
 use spectroll::{
-    Arithmetic, BindingRole, Bounds, BuiltinTable, ComputeShader, Dataset, Dtype, Engine, EngineChoice,
-    EngineError, Extrapolation, Fit, Intensity, Layout, Model, ProposalKind, Quantity, Recipe, RecipeBuilder,
-    ShaderVariant, SpectrumKind, Stream,
+    Arithmetic, Batch, BindingRole, Bounds, BuiltinTable, ComputeShader, Dataset, Dtype, Engine,
+    EngineChoice, EngineError, Extrapolation, Fit, Intensity, Layout, Model, ProposalKind, Quantity, Recipe,
+    RecipeBuilder, Sensors, ShaderVariant, SpectrumKind, Stream,
 };
 use tape::Tape;
 
@@ -62,6 +62,7 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
         ("cover", of(surfaces().lrv(0.99).bounds(Bounds::Scaled))),
         ("log-uniform", lit(lights().intensity(intensity))),
         ("of the data", lit(lights().intensity(Intensity::Data))),
+        ("given", of(surfaces().given(Sensors::builtin("cie1931").expect("it is built in")))),
         ("looped", of(fine_surfaces())),
         ("looped lrv each", of(fine_surfaces().lrv(0.2..0.6).bounds(Bounds::Both))),
     ]
@@ -77,15 +78,28 @@ fn engine() -> Engine {
     Engine::with_threads(&EngineChoice::Cpu, NonZeroUsize::new(1)).expect("a CPU")
 }
 
+/// Responses that draws are given: greys and what is near them.
+fn colours(width: usize, first: u64, count: u64) -> Vec<f32> {
+    let grey = |draw: u64| 0.2 + 0.3 * (draw % 97) as f32 / 97.0;
+    let of = |draw| (0..width).map(move |channel| grey(draw) + 0.01 * channel as f32);
+    (first..first + count).flat_map(of).collect()
+}
+
 /// The words of each output buffer, as the CPU makes them.
 fn expected(engine: &Engine, recipe: &Recipe, stream: Stream, first: u64, count: u64) -> Vec<Vec<u32>> {
     let mut arrays = vec![Vec::new(); recipe.formats().len()];
-    let drawn = engine.draw(recipe, stream.draws(first..first + count), |batch| {
+    let mut session = engine.session(recipe).expect("the CPU draws");
+    let draws = stream.draws(first..first + count);
+    let sink = |batch: Batch| {
         for (array, format) in arrays.iter_mut().zip(batch.formats()) {
             array.extend(words(batch.bytes(format.quantity)));
         }
         Ok::<_, EngineError>(())
-    });
+    };
+    let drawn = match recipe.settings().given.as_ref().map_or(0, Sensors::len) {
+        0 => session.draw(draws, sink),
+        width => session.draw_given(draws, &colours(width, first, count), sink),
+    };
     drawn.expect("the CPU draws");
     arrays
 }
@@ -103,6 +117,10 @@ fn buffers(
     let words = |role| match role {
         BindingRole::Parameters => {
             bytemuck::cast_slice(&shader.parameters(stream.draws(first..first + count), count)).to_vec()
+        }
+        BindingRole::Given => {
+            let width = shader.bytes(BindingRole::Given, 4) as usize / 16;
+            colours(width, first, count.next_multiple_of(2)).into_iter().map(f32::to_bits).collect()
         }
         role => match shader.contents(role) {
             Some(bytes) => bytemuck::cast_slice(bytes).to_vec(),

@@ -77,6 +77,20 @@ pub(crate) fn npy(path: &Path) -> (Vec<u64>, Vec<f32>) {
     (shape, values)
 }
 
+/// What a script of this folder prints, whose `main` takes the program, the tables in `data`, and these arguments.
+pub(crate) fn script(folder: &Path, name: &str, arguments: &str) -> String {
+    let [tests, data] = ["tests", "data"].map(|name| format!("{}/{name}", env!("CARGO_MANIFEST_DIR")));
+    let code = format!(
+        "import sys, warnings\n\
+         warnings.simplefilter('ignore')\n\
+         sys.dont_write_bytecode = True\n\
+         sys.path.insert(0, {tests:?})\n\
+         import {name}\n\
+         {name}.main({PROGRAM:?}, {data:?}{arguments})"
+    );
+    python(folder, &code)
+}
+
 /// What Python prints. SPECTROLL_PYTHON names one that has the readers of every format; `make test` makes one.
 pub(crate) fn python(folder: &Path, code: &str) -> String {
     let python = std::env::var("SPECTROLL_PYTHON").unwrap_or_else(|_| "python3".to_owned());

@@ -1,6 +1,7 @@
 //! Pictures of metamers: an image under several lights, in which spectra of one colour part; and the spectra of a table's
 //! colours, with their chromaticities under these lights.
 
+use kuva::plot::scatter::MarkerShape;
 use kuva::prelude::{LinePlot, ScatterPlot};
 use kuva::render::render::Scene;
 use spectroll::evaluation::plot::{self, Caption, Theme};
@@ -12,6 +13,13 @@ use super::panel::{self, Axes, MARGINS, Panel, curve};
 /// Lights of the pictures, with their names.
 const LIGHTS: [(&str, Illuminant); 3] =
     [("D65", Illuminant::D65), ("A", Illuminant::A), ("F11", Illuminant::F11)];
+
+/// Marks of a chart for each light, and the words for these.
+const MARKS: [(MarkerShape, &str); 3] = [
+    (MarkerShape::Diamond, "diamonds"),
+    (MarkerShape::Circle, "circles"),
+    (MarkerShape::Triangle, "triangles"),
+];
 
 /// Pixels between the images.
 const GAP: usize = 8;
@@ -93,7 +101,8 @@ impl Chart<'_> {
     fn parted(&self) -> Panel {
         let mut plots = Vec::new();
         let (mut x, mut y) = ((f64::INFINITY, f64::NEG_INFINITY), (f64::INFINITY, f64::NEG_INFINITY));
-        for (number, (_, light)) in LIGHTS.iter().enumerate() {
+        // The first on top, where a colour's spectra lie on one point.
+        for (number, (_, light)) in LIGHTS.iter().enumerate().rev() {
             let weights = Observer::Cie1931.xyz_weights_under(&light.power(self.grid), self.grid);
             let Some(weights) = weights else { continue };
             let whites = weights.each_ref().map(|weights| weights.iter().sum::<f64>());
@@ -113,15 +122,17 @@ impl Chart<'_> {
                 (x, y) = ((x.0.min(point.0), x.1.max(point.0)), (y.0.min(point.1), y.1.max(point.1)));
             }
             let colour = self.theme.colours()[number];
-            plots.push(ScatterPlot::new().with_data(points).with_color(colour).with_size(3.0).into());
+            let plot = ScatterPlot::new().with_data(points).with_color(colour).with_marker(MARKS[number].0);
+            plots.push(plot.with_size(if number == 0 { 5.0 } else { 3.0 }).into());
         }
         let pad =
             |(low, high): (f64, f64)| (low - 0.1 * (high - low) - 1e-3, high + 0.1 * (high - low) + 1e-3);
         let layout = self.theme.axes(pad(x), pad(y), MARGINS).with_x_label("x, relative to white");
-        let names = LIGHTS.map(|(name, _)| name);
+        let names: Vec<_> =
+            LIGHTS.iter().zip(MARKS).map(|((name, _), (_, mark))| format!("{name} ({mark})")).collect();
         let caption = Caption {
             title: "Where metamers part".to_owned(),
-            note: format!("chromaticity under {}, in the order of the colours", names.join(", ")),
+            note: format!("chromaticity under {}", names.join(", ")),
             vertical: "y, relative to white".to_owned(),
         };
         (plots, layout, caption)
