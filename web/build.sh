@@ -43,11 +43,6 @@ fi
 rm -rf "$out"
 mkdir -p "$out"
 cp -R web/page/. "$out/"
-"$bindgen" --target web --no-typescript --out-dir "$out/library" --out-name spectroll "$module"
-if command -v wasm-opt >/dev/null; then
-	wasm-opt -O3 --enable-simd --enable-bulk-memory --enable-nontrapping-float-to-int --enable-sign-ext \
-		--enable-mutable-globals --enable-reference-types --enable-multivalue \
-		"$out/library/spectroll_bg.wasm" -o "$out/library/spectroll_bg.wasm"
-fi
+"$bindgen" --target web --no-typescript --remove-name-section --out-dir "$out/library" --out-name spectroll "$module"
 bytes=$(cd "$out" && find . -type f -print0 | sort -z | xargs -0 -n1 gzip -9c | wc -c)
 echo "$out: $bytes bytes compressed"
