@@ -24,9 +24,10 @@ fn data(tables: &[BuiltinTable]) -> Dataset {
     Dataset::new(&tables, Grid::DEFAULT, Extrapolation::Error).expect("they have these wavelengths")
 }
 
-fn figures(model: &Model, data: &Dataset, seed: u64) -> ComparisonFigures {
+/// Figures of so many draws that chance moves none by more than 0.002.
+fn figures(model: &Model, data: &Dataset) -> ComparisonFigures {
     let recipe = Recipe::builder(model).build().expect("it can be drawn");
-    Comparison::new(&recipe, data, Stream::new(seed), 20_000).expect("the data are of its kind").figures()
+    Comparison::new(&recipe, data, Stream::new(0), 300_000).expect("the data are of its kind").figures()
 }
 
 /// What is wanted of draws that are as varied as the data, and does not hold.
@@ -47,14 +48,12 @@ fn unlike(figures: &ComparisonFigures) -> Vec<&'static str> {
 fn draws_are_as_varied_as_the_data() {
     let (surfaces, daylights) = (data(&[BuiltinTable::Munsell, BuiltinTable::Vrhel]), data(&[BuiltinTable::Granada]));
     for (name, data) in [("munsell-vrhel-kernel", &surfaces), ("granada-kernel", &daylights)] {
-        for seed in 0..3 {
-            let figures = figures(&builtin(name), data, seed);
-            println!("{name}: {figures:#?}");
-            assert_eq!(unlike(&figures), [""; 0], "{name}, seed {seed}");
-        }
+        let figures = figures(&builtin(name), data);
+        println!("{name}: {figures:#?}");
+        assert_eq!(unlike(&figures), [""; 0], "{name}");
     }
-    assert_eq!(unlike(&figures(&builtin("munsell-vrhel"), &surfaces, 0)).len(), 4);
-    assert!(!unlike(&figures(&builtin("granada"), &daylights, 0)).is_empty());
+    assert_eq!(unlike(&figures(&builtin("munsell-vrhel"), &surfaces)).len(), 4);
+    assert!(!unlike(&figures(&builtin("granada"), &daylights)).is_empty());
 }
 
 /// The bandwidths that the built-in models have are those that a fit finds.
@@ -164,7 +163,7 @@ fn a_bandwidth_of_zero_repeats_the_measured_spectra() {
     for row in &drawn {
         let nearest = |&i: &usize| -> f64 { (0..6).map(|j| (measured[(i, j)] - row[j]).powi(2)).sum() };
         let at = (0..measured.nrows()).min_by(|a, b| nearest(a).total_cmp(&nearest(b))).unwrap();
-        assert!(nearest(&at).sqrt() < 1e-6, "{row:?}");
+        assert!(nearest(&at).sqrt() < 2e-5, "{row:?}");
         counts[at] += 1;
     }
     let expected = 100_000.0 / inside.len() as f64;
@@ -173,6 +172,41 @@ fn a_bandwidth_of_zero_repeats_the_measured_spectra() {
     let freedom = inside.len() as f64 - 1.0;
     assert!((statistic - freedom).abs() < 5.5 * (2.0 * freedom).sqrt(), "{statistic}");
     assert!((0..counts.len()).all(|i| inside.contains(&i) || counts[i] == 0));
+}
+
+/// Under every rule each spectrum that has a share has an equal one, to the error of its acceptance's estimate; without the
+/// odds, those that are mostly rejected would have next to none.
+#[test]
+fn spectra_have_equal_shares_under_every_rule() {
+    let measured = measured_weights(&builtin("munsell-vrhel-kernel"));
+    let model = with_kernel(0.05, measured.clone());
+    for rule in [None, Some((0.4, Bounds::Scaled)), Some((0.6, Bounds::Both))] {
+        let builder = Recipe::builder(&model).quantities([Quantity::Weights]);
+        let builder = rule.map_or(builder.clone(), |(lrv, bounds)| builder.lrv(lrv).bounds(bounds));
+        let recipe = builder.build().unwrap();
+        let mut counts = vec![0u32; measured.nrows()];
+        let scale: Vec<f64> = model.parts().weight_covariance.diagonal().iter().map(|v| v.sqrt().recip()).collect();
+        let drawn = cpu().draw(&recipe, Stream::new(3).draws(0..200_000), |batch| {
+            for row in bytemuck::cast_slice::<_, f32>(batch.bytes(Quantity::Weights)).chunks_exact(6) {
+                let distance = |&i: &usize| -> f64 {
+                    (0..6).map(|j| (scale[j] * (measured[(i, j)] - f64::from(row[j]))).powi(2)).sum()
+                };
+                let nearest = (0..counts.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+                counts[nearest] += 1;
+            }
+            Ok::<_, EngineError>(())
+        });
+        drawn.expect("every draw succeeds");
+        let kept = measured.nrows() - recipe.left_out();
+        let expected = 200_000.0 / kept as f64;
+        let errors: Vec<f64> =
+            counts.iter().filter(|count| **count > 0).map(|&count| f64::from(count) / expected - 1.0).collect();
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        println!("{rule:?}: {kept} spectra, rms {rms:.3}, by chance {:.3}", expected.sqrt().recip());
+        // A few are so near to others that a draw about one is nearer to the other.
+        assert!(errors.len().abs_diff(kept) <= kept / 50, "{rule:?}: {} of {kept}", errors.len());
+        assert!(rms < 0.25, "{rule:?}: {rms}");
+    }
 }
 
 #[test]
@@ -217,7 +251,7 @@ fn spectra_outside_the_bounds_are_left_out() {
 #[test]
 fn shares_may_differ_by_any_factor() {
     let model = builtin("munsell-vrhel");
-    let covariance = model.parts().weight_covariance.clone() * 0.01;
+    let covariance = model.parts().weight_covariance.clone() * 0.0025;
     let component = |share, first: f64| MixtureComponent {
         share,
         mean: DVector::from_fn(6, |j, _| if j == 0 { first } else { 0.0 }),
@@ -248,7 +282,8 @@ fn a_million_spectra() {
     let start = Instant::now();
     let recipe = Recipe::builder(&model).quantities([Quantity::Weights]).build().unwrap();
     println!("a table of 2^20 spectra took {:.2} s", start.elapsed().as_secs_f64());
-    assert_eq!(recipe.tables().len(), 32 << 20);
+    // Eight numbers and a word of the alias table for each.
+    assert_eq!(recipe.tables().len(), 36 << 20);
     let (drawn, _) = weights(&model, 11, 50_000);
     let (few, _) = weights(&with_kernel(0.2, measured.clone()), 12, 50_000);
     for weight in 0..6 {

@@ -3,10 +3,14 @@
 //!
 //! In the frame of the standard normals z, in which the model's mean is 0 and its covariance 1, a candidate is
 //! `c + F z`: one word chooses the centre c and its lower triangular factor F, and the normals are those of the same
-//! attempt. All maps of z are then maps of it. The word is the one that follows the pairs of the normals.
+//! attempt. All maps of z are then maps of it. The word is the one that follows the pairs of the normals. Where all centres
+//! have the same standard deviation h in every direction, the frame is that of `z / h`, so that a candidate is `c / h + z`:
+//! one sum, and no product that a driver could join with another.
 //!
 //! The choice is weighted by the reciprocal of each centre's acceptance, so that after rejection every centre has the
 //! share of the draws that the model gives it ([`acceptances`]).
+
+#![allow(clippy::needless_range_loop)] // a lane is an index, of several arrays at once
 
 mod acceptance;
 mod bandwidth;
@@ -27,22 +31,25 @@ pub(crate) const MOST_CENTRES: usize = 1 << 20;
 /// would be rejected, would cost more than all others'.
 const LEAST_ACCEPTANCE: f64 = 1.0 / 64.0;
 
-/// Standard deviations of a candidate about its centre.
+/// The smallest unit of a frame. A bandwidth of 0 is one of a millionth: no centre is then at an infinite distance.
+const LEAST_UNIT: f64 = 1e-6;
+
+/// Standard deviations of candidates about centres.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Spread<R> {
+pub(crate) enum Spread {
     /// The same about all, in every direction.
-    Same(R),
+    Same(f64),
     /// The rows of a lower triangular factor for each centre: k (k + 1) / 2 numbers.
-    Own(Vec<R>),
+    Own(Vec<f64>),
 }
 
 /// Centres with what a draw chooses among them by.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Mixture<R> {
     pub(crate) alias: Alias,
-    /// The coordinates of each centre.
-    centres: Vec<R>,
-    spread: Spread<R>,
+    /// The numbers of each centre, in rows of four: its coordinates, and its factor where it has one of its own.
+    rows: Vec<[R; 4]>,
+    has_factors: bool,
     /// Number of coordinates, k.
     components: usize,
 }
@@ -52,7 +59,7 @@ pub(crate) struct Mixture<R> {
 pub(crate) struct Centres {
     /// k coordinates each.
     pub(crate) coordinates: Vec<f64>,
-    pub(crate) spread: Spread<f64>,
+    pub(crate) spread: Spread,
     pub(crate) shares: Vec<f64>,
     pub(crate) components: usize,
 }
@@ -71,46 +78,57 @@ impl Centres {
         if left_out == weights.len() {
             return None;
         }
-        let Centres { coordinates: centres, spread, components, .. } = self;
-        Some((Mixture { alias: Alias::new(&nearest_odds(&weights)), centres, spread, components }, left_out))
+        let mixture = Mixture {
+            alias: Alias::new(&nearest_odds(&weights)),
+            rows: self.rows(),
+            has_factors: matches!(self.spread, Spread::Own(_)),
+            components: self.components,
+        };
+        Some((mixture, left_out))
+    }
+
+    /// The unit of the frame in which the mixture is, in standard deviations.
+    pub(crate) fn unit(&self) -> f64 {
+        match self.spread {
+            Spread::Same(spread) => spread.max(LEAST_UNIT),
+            Spread::Own(_) => 1.0,
+        }
+    }
+
+    /// The numbers of all centres, each in rows of four.
+    fn rows(&self) -> Vec<[f64; 4]> {
+        let (k, unit) = (self.components, self.unit());
+        let of_centre = |(i, coordinates): (usize, &[f64])| {
+            let mut numbers: Vec<f64> = coordinates.iter().map(|c| c / unit).collect();
+            if let Spread::Own(factors) = &self.spread {
+                numbers.extend_from_slice(&factors[i * triangle(k)..][..triangle(k)]);
+            }
+            numbers.resize(numbers.len().next_multiple_of(4), 0.0);
+            numbers.as_chunks::<4>().0.to_vec()
+        };
+        self.coordinates.chunks_exact(k).enumerate().flat_map(of_centre).collect()
     }
 }
 
 impl Mixture<f64> {
     /// Rounds all numbers to the type R.
     pub(crate) fn rounded<R: Real>(&self) -> Mixture<R> {
-        let round = |values: &[f64]| values.iter().map(|&v| R::from_f64(v)).collect::<Vec<R>>();
         Mixture {
             alias: self.alias.clone(),
-            centres: round(&self.centres),
-            spread: match &self.spread {
-                Spread::Same(spread) => Spread::Same(R::from_f64(*spread)),
-                Spread::Own(factors) => Spread::Own(round(factors)),
-            },
+            rows: self.rows.iter().map(|row| row.map(R::from_f64)).collect(),
+            has_factors: self.has_factors,
             components: self.components,
         }
     }
 }
 
 impl Mixture<f32> {
-    /// Words that `shaders/mixture.wgsl` reads: for each column of the alias table [`rows`](Mixture::rows) vectors of four
-    /// words: the column's threshold, its alias, and the numbers of the centre of its number, its coordinates and its
-    /// factor. Columns beyond the centres have numbers that nothing reads.
+    /// Words that a shader reads, in vectors of four: the numbers of each centre, and a word for each column of the alias table.
     pub(crate) fn words(&self) -> Vec<[u32; 4]> {
-        let (k, rows) = (self.components, self.rows());
-        let mut words = Vec::with_capacity(self.alias.columns.len() * rows);
-        for (i, column) in self.alias.columns.iter().enumerate() {
-            let part = |numbers: &[f32], width: usize| numbers.get(i * width..(i + 1) * width).map(<[f32]>::to_vec);
-            let coordinates = part(&self.centres, k).unwrap_or_default();
-            let factor = match &self.spread {
-                Spread::Same(_) => Vec::new(),
-                Spread::Own(factors) => part(factors, triangle(k)).unwrap_or_default(),
-            };
-            let numbers = coordinates.into_iter().chain(factor).map(f32::to_bits);
-            let mut row: Vec<u32> = [column.threshold, column.alias].into_iter().chain(numbers).collect();
-            row.resize(4 * rows, 0);
-            words.extend(row.as_chunks::<4>().0);
-        }
+        let mut words: Vec<_> = self.rows.iter().map(|row| row.map(f32::to_bits)).collect();
+        let mut columns = self.alias.packed();
+        columns.resize(columns.len().next_multiple_of(4), 0);
+        words.extend(columns.as_chunks::<4>().0);
         words
     }
 }
@@ -121,15 +139,20 @@ impl<R: Real> Mixture<R> {
         self.components
     }
 
-    /// Standard deviations of a candidate about its centre.
-    pub(crate) fn spread(&self) -> &Spread<R> {
-        &self.spread
+    /// Whether each centre has a factor of its own.
+    pub(crate) fn has_factors(&self) -> bool {
+        self.has_factors
     }
 
-    /// Number of vectors of four [`words`](Mixture::words) of a column.
-    pub(crate) fn rows(&self) -> usize {
-        let factor = if let Spread::Own(_) = self.spread { triangle(self.components) } else { 0 };
-        (2 + self.components + factor).div_ceil(4)
+    /// Number of centres.
+    pub(crate) fn len(&self) -> usize {
+        self.rows.len() / self.rows_of_each()
+    }
+
+    /// Number of rows of four numbers of a centre.
+    pub(crate) fn rows_of_each(&self) -> usize {
+        let factor = if self.has_factors() { triangle(self.components) } else { 0 };
+        (self.components + factor).div_ceil(4)
     }
 
     /// Number of the word that chooses the centre, from the first of an attempt on.
@@ -140,45 +163,65 @@ impl<R: Real> Mixture<R> {
     /// Turns normals into candidates about the centres that the words choose, in each of L lanes.
     #[inline(always)]
     pub(crate) fn place<const L: usize>(&self, normals: &mut [[R; L]], words: &[u32; L]) {
-        let k = self.components;
-        let mut chosen = [0; L];
+        let (k, each) = (self.components, self.rows_of_each());
+        let mut first = [0; L];
         for l in 0..L {
-            chosen[l] = self.alias.choose(words[l]) as usize;
+            first[l] = self.alias.choose(words[l]) as usize * each;
         }
-        match &self.spread {
-            Spread::Same(spread) => {
-                for (j, normal) in normals[..k].iter_mut().enumerate() {
-                    let centres = in_lanes(&self.centres, &chosen, k, j);
-                    for l in 0..L {
-                        normal[l] = centres[l] + *spread * normal[l];
-                    }
-                }
-            }
-            // From the last on, since each takes the normals before it.
-            Spread::Own(factors) => {
-                for j in (0..k).rev() {
-                    let mut sum = in_lanes(&self.centres, &chosen, k, j);
-                    for i in 0..=j {
-                        let gain = in_lanes(factors, &chosen, triangle(k), triangle(j) + i);
-                        for l in 0..L {
-                            sum[l] = sum[l] + gain[l] * normals[i][l];
-                        }
-                    }
-                    normals[j] = sum;
+        if self.has_factors {
+            return self.place_by_factors(normals, &first);
+        }
+        for (row, normals) in normals[..k].chunks_mut(4).enumerate() {
+            let centres = self.row_in_lanes(&first, row);
+            for (normal, centre) in normals.iter_mut().zip(centres) {
+                for l in 0..L {
+                    normal[l] = centre[l] + normal[l];
                 }
             }
         }
+    }
+
+    /// [`place`](Mixture::place) by factors: from the last coordinate on, since each takes the normals before it.
+    #[inline(always)]
+    fn place_by_factors<const L: usize>(&self, normals: &mut [[R; L]], first: &[usize; L]) {
+        let k = self.components;
+        let number = |i: usize| self.row_in_lanes(first, i / 4)[i % 4];
+        for j in (0..k).rev() {
+            let mut sum = number(j);
+            for i in 0..=j {
+                let gain = number(k + triangle(j) + i);
+                for l in 0..L {
+                    sum[l] = sum[l] + gain[l] * normals[i][l];
+                }
+            }
+            normals[j] = sum;
+        }
+    }
+
+    /// The four numbers of a row of each lane's centre, number by number. Not inlined, and four lanes at a time: the compiler
+    /// would make gathers of the loads, at several times their cost.
+    #[inline(never)]
+    fn row_in_lanes<const L: usize>(&self, first: &[usize; L], row: usize) -> [[R; L]; 4] {
+        let mut numbers = [[R::ZERO; L]; 4];
+        let (fours, rest) = first.as_chunks::<4>();
+        for (i, four) in fours.iter().enumerate() {
+            // Each by its number: `map` is not inlined here.
+            let [a, b, c, d] = [four[0], four[1], four[2], four[3]];
+            let [a, b, c, d] =
+                [self.rows[a + row], self.rows[b + row], self.rows[c + row], self.rows[d + row]];
+            for j in 0..4 {
+                numbers[j][4 * i..][..4].copy_from_slice(&[a[j], b[j], c[j], d[j]]);
+            }
+        }
+        for (i, first) in rest.iter().enumerate() {
+            let row = self.rows[first + row];
+            numbers.iter_mut().zip(row).for_each(|(numbers, number)| numbers[4 * fours.len() + i] = number);
+        }
+        numbers
     }
 }
 
 /// Number of entries of a lower triangle with this number of rows.
 pub(crate) fn triangle(rows: usize) -> usize {
     rows * (rows + 1) / 2
-}
-
-/// One number of each lane's centre, of `width` each. Not inlined: the compiler would make gathers of the loads, at several
-/// times their cost.
-#[inline(never)]
-fn in_lanes<R: Real, const L: usize>(numbers: &[R], chosen: &[usize; L], width: usize, number: usize) -> [R; L] {
-    std::array::from_fn(|l| numbers[chosen[l] * width + number])
 }

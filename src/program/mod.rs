@@ -112,6 +112,21 @@ impl Program {
         Program { spectrum: self.spectrum.at(responses), outputs, given: 0, ..self.clone() }
     }
 
+    /// Returns the program in normals of another unit, in standard deviations.
+    pub(crate) fn in_units(self, unit: f64) -> Program {
+        let scaled = |map: Affine| {
+            let gain = map.gain.into_iter().map(|gain| gain.into_iter().map(|g| unit * g).collect()).collect();
+            Affine { gain, ..map }
+        };
+        let source = |source| match source {
+            Source::Map(map, Unit::Over(over)) => Source::Map(scaled(map), Unit::Over(scaled(over))),
+            Source::Map(map, unit) => Source::Map(scaled(map), unit),
+            other => other,
+        };
+        let outputs = self.outputs.into_iter().map(|o| Output { source: source(o.source), ..o }).collect();
+        Program { spectrum: scaled(self.spectrum), outputs, ..self }
+    }
+
     /// Returns the program with candidates from a cover.
     pub(crate) fn covered(self, cover: &Cover) -> Program {
         let frame = cover.frame();

@@ -386,14 +386,14 @@ impl RecipeBuilder {
         let others = [
             ("target tristimulus values", self.xyz.is_some()),
             ("a cover", self.proposal == ProposalKind::Cover),
-            ("bounds on what is scaled to a target of each draw's own", program.tests_own_targets()),
+            (OWN_TARGETS, program.tests_own_targets()),
         ];
         if let Some((other, _)) = others.into_iter().find(|(_, is_set)| *is_set) {
             return Err(RecipeError::CentresAnd { name, other });
         }
-        let count = centres.shares.len();
+        let (count, unit) = (centres.shares.len(), centres.unit());
         let (mixture, left_out) = centres.within(half_spaces).ok_or(RecipeError::NoCentres { name, count })?;
-        let program = Program { proposal: Some(Proposal::Centres(mixture)), ..program };
+        let program = Program { proposal: Some(Proposal::Centres(mixture)), ..program.in_units(unit) };
         let (acceptance, max_attempts) = (pilot(&program), program.max_attempts);
         if failure(acceptance, max_attempts) > TOLERABLE_FAILURE {
             return Err(RecipeError::Hopeless { acceptance, max_attempts });
@@ -610,6 +610,9 @@ impl RecipeBuilder {
         Ok(weights)
     }
 }
+
+/// What makes the acceptance of a centre differ from draw to draw.
+pub(super) const OWN_TARGETS: &str = "bounds on what is scaled to a target of each draw's own";
 
 /// The law of a target, if its values are those of one.
 fn law(

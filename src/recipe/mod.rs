@@ -26,7 +26,7 @@ use crate::affine::Affine;
 use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::model::Model;
-use crate::program::{self, Program, feasibility};
+use crate::program::{self, Program, Proposal, feasibility};
 use crate::quantity::{ArrayFormat, Quantity, ValueRange};
 use crate::random::real::Real;
 use crate::random::stream::Stream;
@@ -208,6 +208,13 @@ impl Recipe {
     /// in 64 spectra would be accepted. 0 of Gaussian models.
     pub fn left_out(&self) -> usize {
         self.left_out
+    }
+
+    /// The error of targets of each draw's own that bound its spectrum, where the model is not a Gaussian.
+    pub(crate) fn centres_at_own_targets(&self) -> Option<RecipeError> {
+        let name = self.model.distribution().name();
+        let has_centres = matches!(self.program.proposal, Some(Proposal::Centres(_)));
+        has_centres.then_some(RecipeError::CentresAnd { name, other: builder::OWN_TARGETS })
     }
 
     /// Range of values that its spectra may take.

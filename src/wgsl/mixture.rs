@@ -2,36 +2,37 @@
 
 use super::proposal::choice;
 use super::shader::kept;
-use super::writer::float;
-use crate::mixture::{Mixture, Spread, triangle};
+use crate::mixture::{Mixture, triangle};
 
 const LOOPED: &str = include_str!("../../shaders/mixture_looped.wgsl");
 
 const LETTERS: [&str; 4] = ["x", "y", "z", "w"];
 
 impl Mixture<f32> {
-    /// `choose(word) -> u32`, of the table of [`words`](Self::words).
+    /// `choose(word) -> u32`: the first row of the centre that a word chooses, in the table of [`words`](Self::words).
     pub(super) fn chooser(&self) -> String {
-        choice(&self.alias, self.rows())
+        let columns = 4 * self.rows_of_each() * self.len();
+        let column = format!(
+            "let packed = proposal_word({columns}u + c);\n    let low = (1u << BITS) - 1u;\n    \
+             return vec2(packed & ~low, packed & low);"
+        );
+        choice(&self.alias, self.rows_of_each(), &column)
     }
 
     /// The lines that read the centre which a word chooses, in straight-line code: `word` is the expression for it.
     pub(super) fn read(&self, word: &str) -> String {
-        let rows = (0..self.rows()).map(|r| format!("let c{r} = proposal_row(row + {r}u);\n"));
-        format!("let row = choose({word});\n{}", rows.collect::<String>().trim_end())
+        let rows = (0..self.rows_of_each()).map(|r| format!("\nlet c{r} = bitcast<vec4<f32>>(proposal_row(row + {r}u));"));
+        format!("let row = choose({word});{}", rows.collect::<String>())
     }
 
     /// Coordinate `j` of the candidate, where `normal` names each normal.
     pub(super) fn coordinate(&self, j: usize, normal: impl Fn(usize) -> String) -> String {
-        let number = |i: usize| format!("bitcast<f32>(c{}.{})", (i + 2) / 4, LETTERS[(i + 2) % 4]);
+        let number = |i: usize| format!("c{}.{}", i / 4, LETTERS[i % 4]);
         let k = self.components();
         let first = number(j);
-        match self.spread() {
-            Spread::Same(spread) => {
-                let spread = float(f64::from(*spread));
-                format!("rounded({first} + rounded({spread} * {}))", normal(j))
-            }
-            Spread::Own(_) => (0..=j).fold(first, |sum, i| {
+        match self.has_factors() {
+            false => format!("rounded({first} + {})", normal(j)),
+            true => (0..=j).fold(first, |sum, i| {
                 format!("rounded({sum} + rounded({} * {}))", number(k + triangle(j) + i), normal(i))
             }),
         }
@@ -39,17 +40,12 @@ impl Mixture<f32> {
 
     /// `place(z, row)`, which turns normals into a candidate in a loop.
     pub(super) fn looped(&self) -> String {
-        let is_own = matches!(self.spread(), Spread::Own(_));
         let text = kept(LOOPED, |word| match word {
-            "own" => is_own,
-            "alike" => !is_own,
+            "own" => self.has_factors(),
+            "alike" => !self.has_factors(),
             other => unreachable!("mixture_looped.wgsl has a line for mixtures that are {other:?}"),
         });
-        let spread = match self.spread() {
-            Spread::Same(spread) => format!("const SPREAD = {};\n", float(f64::from(*spread))),
-            Spread::Own(_) => String::new(),
-        };
-        format!("const COMPONENTS = {}u;\n{spread}{}\n{text}\n", self.components(), self.chooser())
+        format!("const COMPONENTS = {}u;\n{}\n{text}\n", self.components(), self.chooser())
     }
 
     /// The line that calls it, at the end of what makes normals in a loop.
@@ -63,9 +59,6 @@ impl Mixture<f32> {
     /// Number of times that the loops of a candidate go round.
     pub(super) fn iterations(&self) -> usize {
         let k = self.components();
-        match self.spread() {
-            Spread::Same(_) => k,
-            Spread::Own(_) => k + triangle(k),
-        }
+        if self.has_factors() { k + triangle(k) } else { k }
     }
 }

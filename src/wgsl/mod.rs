@@ -200,7 +200,7 @@ mod tests {
     }
 
     /// Two centres.
-    fn mixture(components: usize, spread: Spread<f64>) -> Mixture<f64> {
+    fn mixture(components: usize, spread: Spread) -> Mixture<f64> {
         let coordinates = (0..2 * components).map(|i| 0.25 * i as f64).collect();
         let centres = Centres { coordinates, spread, shares: vec![1.0, 3.0], components };
         centres.within(&[]).expect("nothing is rejected").0

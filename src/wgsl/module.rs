@@ -130,6 +130,11 @@ fn storage(program: &Program, numbers: usize, storage: Option<TableStorage>) -> 
             body.line(&format!("return bitcast<f32>({name}[i]);"));
         });
     }
+    if program.proposal.is_some() && !program.is_covered() {
+        text.block("fn proposal_word(i: u32) -> u32", |body| {
+            body.line(&format!("return {name}[{numbers}u + i];"));
+        });
+    }
     if program.proposal.is_some() {
         text.block("fn proposal_row(i: u32) -> vec4<u32>", |body| {
             body.line(&format!("let at = {numbers}u + 4u * i;"));

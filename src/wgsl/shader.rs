@@ -138,6 +138,9 @@ pub(crate) fn shader_without(
     if program.proposal.is_some() {
         let rows = format!("@group(0) @binding({PROPOSAL_AT}) var<storage, read> proposal: array<vec4<u32>>;\n\n");
         parts.push(rows + "fn proposal_row(i: u32) -> vec4<u32> { return proposal[i]; }\n");
+        if !program.is_covered() {
+            parts.push("fn proposal_word(i: u32) -> u32 { return proposal[i / 4u][i % 4u]; }\n".to_owned());
+        }
     }
     let elements = || program.outputs.iter().map(|output| output.format.dtype);
     if elements().any(|element| element == Dtype::F16) {

@@ -91,8 +91,12 @@ impl Centres {
         };
         let bytes = scenario.recipe().tables();
         let words: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
-        let columns: Vec<[u32; 2]> =
-            words.chunks_exact((2 + k).next_multiple_of(4)).map(|row| [row[0], row[1]]).collect();
+        // After the centres: a word for each column, the alias in its lowest bits.
+        let count = weights.nrows().next_power_of_two();
+        let columns: Vec<[u32; 2]> = words[weights.nrows() * k.next_multiple_of(4)..][..count]
+            .iter()
+            .map(|word| [word & !(count as u32 - 1), word & (count as u32 - 1)])
+            .collect();
         let mut odds = vec![0.0; weights.nrows()];
         for (column, &[threshold, alias]) in columns.iter().enumerate() {
             let share = f64::from(threshold) / 2f64.powi(32);
