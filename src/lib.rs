@@ -88,8 +88,8 @@ pub use metamers::{
     UnreachableColours,
 };
 pub use model::{
-    BuiltinData, Distribution, Fit, FitDistribution, FitError, MAX_COMPONENTS, MixtureComponent, Model, ModelError,
-    ModelParts, Normalization,
+    BuiltinData, Distribution, Fit, FitDistribution, FitError, MAX_COMPONENTS, MixtureComponent, Model,
+    ModelError, ModelParts, Normalization,
 };
 pub use program::Bounds;
 pub use quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};

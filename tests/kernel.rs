@@ -12,7 +12,8 @@ use program::{fails, script, succeeds};
 use spectroll::evaluation::comparison::{Comparison, ComparisonFigures};
 use spectroll::{
     Bounds, BuiltinTable, Dataset, Distribution, EngineError, Extrapolation, Fit, FitDistribution, Grid,
-    MixtureComponent, Model, ModelError, ProposalKind, Quantity, Recipe, RecipeError, Sensors, SpectrumKind, Stream,
+    MixtureComponent, Model, ModelError, ProposalKind, Quantity, Recipe, RecipeError, Sensors, SpectrumKind,
+    Stream,
 };
 
 fn builtin(name: &str) -> Model {
@@ -46,7 +47,8 @@ fn unlike(figures: &ComparisonFigures) -> Vec<&'static str> {
 /// Draws of the built-in kernels are like the data, which those of the Gaussian of the surfaces are not in any respect.
 #[test]
 fn draws_are_as_varied_as_the_data() {
-    let (surfaces, daylights) = (data(&[BuiltinTable::Munsell, BuiltinTable::Vrhel]), data(&[BuiltinTable::Granada]));
+    let (surfaces, daylights) =
+        (data(&[BuiltinTable::Munsell, BuiltinTable::Vrhel]), data(&[BuiltinTable::Granada]));
     for (name, data) in [("munsell-vrhel-kernel", &surfaces), ("granada-kernel", &daylights)] {
         let figures = figures(&builtin(name), data);
         println!("{name}: {figures:#?}");
@@ -60,7 +62,11 @@ fn draws_are_as_varied_as_the_data() {
 #[test]
 fn bandwidths_of_built_in_models_are_found_by_a_fit() {
     for (name, kind, tables) in [
-        ("munsell-vrhel-kernel", SpectrumKind::Reflectance, &[BuiltinTable::Munsell, BuiltinTable::Vrhel][..]),
+        (
+            "munsell-vrhel-kernel",
+            SpectrumKind::Reflectance,
+            &[BuiltinTable::Munsell, BuiltinTable::Vrhel][..],
+        ),
         ("granada-kernel", SpectrumKind::Illuminant, &[BuiltinTable::Granada]),
     ] {
         let fitted = Fit::new(kind).distribution(FitDistribution::Kernel(None)).fit(&data(tables)).unwrap();
@@ -79,7 +85,8 @@ fn draws_are_those_of_numpy() {
     for (command, bandwidth) in
         [("munsell vrhel", "auto"), ("munsell vrhel", "0.08"), ("koivisto", "0.2"), ("granada", "auto")]
     {
-        let fit = format!("fit {command} --distribution kernel --bandwidth {bandwidth} -o kernel.json --force");
+        let fit =
+            format!("fit {command} --distribution kernel --bandwidth {bandwidth} -o kernel.json --force");
         succeeds(folder.path(), &fit);
         let sample = "sample kernel.json -n 100000 --seed 5 --engine cpu --force -q";
         succeeds(folder.path(), &format!("{sample} -o spectra.npy"));
@@ -95,7 +102,9 @@ fn weights(model: &Model, seed: u64, count: u64) -> (Vec<Vec<f64>>, f64) {
     let mut rows = Vec::new();
     let summary = cpu().draw(&recipe, Stream::new(seed).draws(0..count), |batch| {
         let values: &[f32] = bytemuck::cast_slice(batch.bytes(Quantity::Weights));
-        rows.extend(values.chunks_exact(model.components()).map(|w| w.iter().map(|&w| f64::from(w)).collect()));
+        rows.extend(
+            values.chunks_exact(model.components()).map(|w| w.iter().map(|&w| f64::from(w)).collect()),
+        );
         Ok::<_, EngineError>(())
     });
     let acceptance = summary.expect("every draw succeeds").acceptance().expect("there are draws");
@@ -185,7 +194,8 @@ fn spectra_have_equal_shares_under_every_rule() {
         let builder = rule.map_or(builder.clone(), |(lrv, bounds)| builder.lrv(lrv).bounds(bounds));
         let recipe = builder.build().unwrap();
         let mut counts = vec![0u32; measured.nrows()];
-        let scale: Vec<f64> = model.parts().weight_covariance.diagonal().iter().map(|v| v.sqrt().recip()).collect();
+        let scale: Vec<f64> =
+            model.parts().weight_covariance.diagonal().iter().map(|v| v.sqrt().recip()).collect();
         let drawn = cpu().draw(&recipe, Stream::new(3).draws(0..200_000), |batch| {
             for row in bytemuck::cast_slice::<_, f32>(batch.bytes(Quantity::Weights)).chunks_exact(6) {
                 let distance = |&i: &usize| -> f64 {
@@ -199,8 +209,11 @@ fn spectra_have_equal_shares_under_every_rule() {
         drawn.expect("every draw succeeds");
         let kept = measured.nrows() - recipe.left_out();
         let expected = 200_000.0 / kept as f64;
-        let errors: Vec<f64> =
-            counts.iter().filter(|count| **count > 0).map(|&count| f64::from(count) / expected - 1.0).collect();
+        let errors: Vec<f64> = counts
+            .iter()
+            .filter(|count| **count > 0)
+            .map(|&count| f64::from(count) / expected - 1.0)
+            .collect();
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
         println!("{rule:?}: {kept} spectra, rms {rms:.3}, by chance {:.3}", expected.sqrt().recip());
         // A few are so near to others that a draw about one is nearer to the other.
@@ -223,7 +236,8 @@ fn one_spectrum_and_repeated_spectra() {
     assert!((mean - factor * measured[(one, 0)]).abs() < 6.0 * deviation / 20_000f64.sqrt(), "{mean}");
 
     let twice = DMatrix::from_fn(2 * measured.nrows(), 6, |i, j| measured[(i / 2, j)]);
-    let (once, twice) = (weights(&with_kernel(0.3, measured), 6, 50_000), weights(&with_kernel(0.3, twice), 7, 50_000));
+    let (once, twice) =
+        (weights(&with_kernel(0.3, measured), 6, 50_000), weights(&with_kernel(0.3, twice), 7, 50_000));
     for weight in 0..6 {
         assert!(distance(&once.0, &twice.0, weight) < FAR, "weight {weight}");
     }
@@ -234,11 +248,13 @@ fn one_spectrum_and_repeated_spectra() {
 fn spectra_outside_the_bounds_are_left_out() {
     let measured = measured_weights(&builtin("munsell-vrhel-kernel"));
     let rows = measured.nrows();
-    let added = DMatrix::from_fn(rows + 50, 6, |i, j| if i < rows { measured[(i, j)] } else { 20.0 + i as f64 });
+    let added =
+        DMatrix::from_fn(rows + 50, 6, |i, j| if i < rows { measured[(i, j)] } else { 20.0 + i as f64 });
     let recipe = |weights| Recipe::builder(&with_kernel(0.25, weights)).build().unwrap();
     let (before, after) = (recipe(measured.clone()), recipe(added.clone()));
     assert_eq!(after.left_out(), before.left_out() + 50);
-    let (once, more) = (weights(&with_kernel(0.25, measured), 8, 50_000), weights(&with_kernel(0.25, added), 9, 50_000));
+    let (once, more) =
+        (weights(&with_kernel(0.25, measured), 8, 50_000), weights(&with_kernel(0.25, added), 9, 50_000));
     assert!((once.1 - more.1).abs() < 0.012);
     for weight in 0..6 {
         assert!(distance(&once.0, &more.0, weight) < FAR, "weight {weight}");
@@ -339,7 +355,8 @@ fn model_files_keep_their_distribution() {
         assert!(said.contains(message), "{said}");
     }
     let weights = DMatrix::from_element(2, 5, 0.1);
-    let refused = builtin("munsell-vrhel").with_distribution(Distribution::Kernel { bandwidth: 0.5, weights });
+    let refused =
+        builtin("munsell-vrhel").with_distribution(Distribution::Kernel { bandwidth: 0.5, weights });
     assert!(matches!(refused, Err(ModelError::Shape { found: 5, expected: 6, .. })), "{refused:?}");
 }
 

@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 use spectroll::output::IfExists;
 use spectroll::suggestion::closest;
 use spectroll::{
-    Dataset, Distribution, Fit, FitDistribution, Grid, Model as Fitted, ModelError, Normalization, SpectrumKind, Table,
+    Dataset, Distribution, Fit, FitDistribution, Grid, Model as Fitted, ModelError, Normalization,
+    SpectrumKind, Table,
 };
 
 use crate::data::Onto;
@@ -240,7 +241,9 @@ fn distribution((name, bandwidth, normals): (&str, Option<f64>, Option<usize>)) 
         return Err(error::value(format!("bandwidth= belongs to distribution=\"kernel\", not to {name:?}")));
     }
     if normals.is_some() && name != "mixture" {
-        return Err(error::value(format!("mixture_components= belongs to distribution=\"mixture\", not to {name:?}")));
+        return Err(error::value(format!(
+            "mixture_components= belongs to distribution=\"mixture\", not to {name:?}"
+        )));
     }
     Ok(match name {
         "kernel" => FitDistribution::Kernel(bandwidth),

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use spectroll::output::write_file;
 use spectroll::wording::counted;
 use spectroll::{
-    Dataset, Distribution, Extrapolation, Fit, FitDistribution, Grid, Missing, Model, Normalization, ResampleMethod,
-    Resampling, SpectraCounts, SpectrumKind, Table,
+    Dataset, Distribution, Extrapolation, Fit, FitDistribution, Grid, Missing, Model, Normalization,
+    ResampleMethod, Resampling, SpectraCounts, SpectrumKind, Table,
 };
 
 use super::exit::Usage;
@@ -100,11 +100,12 @@ const MIXTURE_COMPONENTS: usize = 3;
 impl Arguments {
     /// The distribution that is asked for.
     fn distribution(&self) -> anyhow::Result<FitDistribution> {
-        let needs = |option: &str, kind: &str| {
-            Err(Usage(format!("{option} needs --distribution {kind}")).into())
-        };
+        let needs =
+            |option: &str, kind: &str| Err(Usage(format!("{option} needs --distribution {kind}")).into());
         match (self.distribution, self.bandwidth, self.mixture_components) {
-            (DistributionKind::Gaussian | DistributionKind::Mixture, Some(_), _) => needs("--bandwidth", "kernel"),
+            (DistributionKind::Gaussian | DistributionKind::Mixture, Some(_), _) => {
+                needs("--bandwidth", "kernel")
+            }
             (DistributionKind::Gaussian | DistributionKind::Kernel, _, Some(_)) => {
                 needs("--mixture-components", "mixture")
             }

@@ -297,7 +297,8 @@ mod tests {
             let words = |i| Stream::named(seed, "points").block(i, 0, 0);
             (0..400).map(|i| [words(i)[0], words(i)[1]].map(|w| f64::from(w) / 2f64.powi(32) + by)).collect()
         };
-        let p_values: Vec<f64> = (0..20).map(|i| energy_p_value(&points(2 * i, 0.0), &points(2 * i + 1, 0.0))).collect();
+        let p_values: Vec<f64> =
+            (0..20).map(|i| energy_p_value(&points(2 * i, 0.0), &points(2 * i + 1, 0.0))).collect();
         // Of 20 uniform p-values the least is below 0.0005 in 1 case of 100.
         assert!(p_values.iter().all(|p| *p > 5e-4) && p_values.iter().any(|p| *p < 0.5), "{p_values:?}");
         assert_eq!(energy_p_value(&points(0, 0.0), &points(1, 0.1)), 0.001);

@@ -26,7 +26,8 @@ pub(crate) fn acceptances(centres: &Centres, half_spaces: &[HalfSpace]) -> Vec<f
     let count = centres.shares.len();
     let each = (CANDIDATES / count).clamp(EACH[0], EACH[1]).next_power_of_two();
     let normals = normals(k, each);
-    let bounds: Vec<Bound> = half_spaces.iter().map(|half_space| Bound::new(half_space, centres, &normals)).collect();
+    let bounds: Vec<Bound> =
+        half_spaces.iter().map(|half_space| Bound::new(half_space, centres, &normals)).collect();
     let accepted = threads::map(count as u64, GRAIN, |centre| {
         accepted(centres, centre as usize, half_spaces, &bounds, &normals)
     });
@@ -41,8 +42,14 @@ fn normals(k: usize, each: usize) -> Vec<Vec<f64>> {
     for index in 0..each as u64 / 2 {
         for (block, coordinates) in coordinates.chunks_mut(4).enumerate() {
             let words = stream.block(index, 0, block as u32);
-            let pairs = [<f64 as Real>::normal_pair(words[0], words[1]), <f64 as Real>::normal_pair(words[2], words[3])];
-            coordinates.iter_mut().zip(pairs.as_flattened()).for_each(|(column, normal)| column.push(*normal));
+            let pairs = [
+                <f64 as Real>::normal_pair(words[0], words[1]),
+                <f64 as Real>::normal_pair(words[2], words[3]),
+            ];
+            coordinates
+                .iter_mut()
+                .zip(pairs.as_flattened())
+                .for_each(|(column, normal)| column.push(*normal));
         }
     }
     for column in &mut coordinates {
@@ -95,7 +102,10 @@ fn accepted(
         let (seen, most) = match &centres.spread {
             Spread::Same(_) => (&bound.seen, bound.most),
             Spread::Own(factors) => {
-                own = weighted(&turned(&half_space.normal, &factors[centre * triangle(k)..][..triangle(k)]), normals);
+                own = weighted(
+                    &turned(&half_space.normal, &factors[centre * triangle(k)..][..triangle(k)]),
+                    normals,
+                );
                 (&own, f64::INFINITY)
             }
         };

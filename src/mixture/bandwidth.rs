@@ -33,7 +33,8 @@ pub(crate) fn bandwidth(coordinates: &[f64], components: usize, half_spaces: &[H
     let all: Vec<&[f64]> = coordinates.chunks_exact(k).collect();
     let stride = all.len().div_ceil(MOST);
     let spectra: Vec<&[f64]> = all.iter().copied().step_by(stride).collect();
-    let judged: Vec<&[f64]> = spectra.iter().copied().filter(|spectrum| is_within(spectrum, half_spaces)).collect();
+    let judged: Vec<&[f64]> =
+        spectra.iter().copied().filter(|spectrum| is_within(spectrum, half_spaces)).collect();
     if judged.len() < 2 {
         return 1.0;
     }
@@ -63,9 +64,9 @@ pub(crate) fn bandwidth(coordinates: &[f64], components: usize, half_spaces: &[H
 }
 
 fn is_within(coordinates: &[f64], half_spaces: &[HalfSpace]) -> bool {
-    half_spaces.iter().all(|bound| {
-        bound.normal.iter().zip(coordinates).map(|(gain, z)| gain * z).sum::<f64>() < bound.room
-    })
+    half_spaces
+        .iter()
+        .all(|bound| bound.normal.iter().zip(coordinates).map(|(gain, z)| gain * z).sum::<f64>() < bound.room)
 }
 
 /// The sum of the logarithms of each judged spectrum's density by the other spectra.
@@ -125,8 +126,11 @@ mod tests {
     fn data_say_how_far_they_are_from_normal() {
         let values = normal(400);
         assert!(bandwidth(&values, 1, &[]) > 0.35);
-        let clusters: Vec<f64> =
-            values.iter().enumerate().map(|(i, z)| if i % 2 == 0 { 0.999 } else { -0.999 } + 0.03 * z).collect();
+        let clusters: Vec<f64> = values
+            .iter()
+            .enumerate()
+            .map(|(i, z)| if i % 2 == 0 { 0.999 } else { -0.999 } + 0.03 * z)
+            .collect();
         let found = bandwidth(&clusters, 1, &[]);
         assert!((0.005..0.04).contains(&found), "{found}");
     }

@@ -198,9 +198,8 @@ impl<R: Real> Mixture<R> {
         }
     }
 
-    /// The four numbers of a row of each lane's centre, number by number. Not inlined, and four lanes at a time: the compiler
-    /// would make gathers of the loads, at several times their cost.
-    #[inline(never)]
+    /// The four numbers of a row of each lane's centre, number by number.
+    #[inline(always)]
     fn row_in_lanes<const L: usize>(&self, first: &[usize; L], row: usize) -> [[R; L]; 4] {
         let mut numbers = [[R::ZERO; L]; 4];
         let (fours, rest) = first.as_chunks::<4>();

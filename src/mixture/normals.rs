@@ -27,7 +27,8 @@ const STARTS: u64 = 4;
 /// `count` normal distributions of data, each with its share; `coordinates` has k of each spectrum. Fewer where some
 /// would have none. The seed of their starts is fixed: the same data have the same ones.
 pub(crate) fn normals(coordinates: &[f64], components: usize, count: usize) -> Vec<Normal> {
-    let data: Vec<DVector<f64>> = coordinates.chunks_exact(components).map(DVector::from_column_slice).collect();
+    let data: Vec<DVector<f64>> =
+        coordinates.chunks_exact(components).map(DVector::from_column_slice).collect();
     let starts = threads::map(STARTS, 1, |seed| from_start(&data, count, seed));
     let best = starts.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).expect("there are starts");
     best.0
@@ -137,7 +138,11 @@ mod tests {
             .flat_map(|i| {
                 let words = stream.block(i, 0, 0);
                 let [x, y] = f64::normal_pair(words[0], words[1]);
-                if i % 3 == 0 { [2.0 + 0.2 * x, -1.0 + 0.1 * y] } else { [-1.0 + 0.5 * x, 0.5 + 0.25 * x + 0.1 * y] }
+                if i % 3 == 0 {
+                    [2.0 + 0.2 * x, -1.0 + 0.1 * y]
+                } else {
+                    [-1.0 + 0.5 * x, 0.5 + 0.25 * x + 0.1 * y]
+                }
             })
             .collect();
         let mut found = normals(&data, 2, 2);

@@ -169,7 +169,8 @@ impl Family {
         let fit = Fit::new(self.kind);
         let fit = components.map_or(fit, |components| fit.components(components)).fit(&data);
         let name = name.to_owned();
-        let model = fit.map_err(|source| ModelError::BuiltinFit { name: name.clone(), grid, source: source.into() })?;
+        let model =
+            fit.map_err(|source| ModelError::BuiltinFit { name: name.clone(), grid, source: source.into() })?;
         self.distributed(&name, model)
     }
 

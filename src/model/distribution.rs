@@ -57,7 +57,8 @@ impl fmt::Display for Distribution {
             }
             Distribution::Mixture(components) => {
                 let total: f64 = components.iter().map(|component| component.share).sum();
-                let percents = components.iter().map(|component| format!("{:.1}", 100.0 * component.share / total));
+                let percents =
+                    components.iter().map(|component| format!("{:.1}", 100.0 * component.share / total));
                 let normals = counted(components.len() as u64, "normal distribution", "normal distributions");
                 write!(f, "mixture of {normals}: {} %", percents.collect::<Vec<_>>().join(", "))
             }
@@ -170,7 +171,10 @@ impl Model {
     pub(crate) fn whitened(&self, weights: &DMatrix<f64>) -> Vec<f64> {
         let whitener = self.whitener();
         let mean = &self.parts.weight_mean;
-        weights.row_iter().flat_map(|row| (&whitener * (row.transpose() - mean)).as_slice().to_vec()).collect()
+        weights
+            .row_iter()
+            .flat_map(|row| (&whitener * (row.transpose() - mean)).as_slice().to_vec())
+            .collect()
     }
 
     /// The inverse of [`weight_factor`](Model::weight_factor) on the directions in which weights vary, 0 on the others.
@@ -267,9 +271,10 @@ impl DistributionRecord {
     /// The distribution of k weights.
     pub(super) fn into_distribution(self, k: usize) -> Result<Distribution, ModelError> {
         match self {
-            DistributionRecord::Kernel { bandwidth, weights } => {
-                Ok(Distribution::Kernel { bandwidth, weights: matrix("a row of distribution.weights", &weights, k)? })
-            }
+            DistributionRecord::Kernel { bandwidth, weights } => Ok(Distribution::Kernel {
+                bandwidth,
+                weights: matrix("a row of distribution.weights", &weights, k)?,
+            }),
             DistributionRecord::Mixture { components } => {
                 let component = |record: ComponentRecord| -> Result<_, ModelError> {
                     let covariance = matrix("a row of a covariance of distribution", &record.covariance, k)?;

@@ -82,9 +82,13 @@ pub enum FitError {
     NotReflectances { mean: f64 },
     #[error(transparent)]
     Unphysical(#[from] Unphysical),
-    #[error("a bandwidth of {0}: it is from 0, which repeats the measured spectra, to 1, which is the Gaussian")]
+    #[error(
+        "a bandwidth of {0}: it is from 0, which repeats the measured spectra, to 1, which is the Gaussian"
+    )]
     Bandwidth(f64),
-    #[error("a mixture of {normals} of {spectra} spectra: it takes at least 1, and at most half as many as spectra")]
+    #[error(
+        "a mixture of {normals} of {spectra} spectra: it takes at least 1, and at most half as many as spectra"
+    )]
     Normals { normals: usize, spectra: usize },
     #[error("the principal components of these data could not be found to 1e-10: please report the data")]
     Decomposition,

@@ -118,7 +118,9 @@ pub enum ModelError {
         crate::mixture::MOST_CENTRES
     )]
     Centres { name: &'static str, found: usize },
-    #[error("a bandwidth of {0}: it is from 0, which repeats the measured spectra, to 1, which is the Gaussian")]
+    #[error(
+        "a bandwidth of {0}: it is from 0, which repeats the measured spectra, to 1, which is the Gaussian"
+    )]
     Bandwidth(f64),
     #[error("a component of the mixture has the share {0}; it must be above 0")]
     Share(f64),

@@ -115,7 +115,8 @@ impl Program {
     /// Returns the program in normals of another unit, in standard deviations.
     pub(crate) fn in_units(self, unit: f64) -> Program {
         let scaled = |map: Affine| {
-            let gain = map.gain.into_iter().map(|gain| gain.into_iter().map(|g| unit * g).collect()).collect();
+            let gain =
+                map.gain.into_iter().map(|gain| gain.into_iter().map(|g| unit * g).collect()).collect();
             Affine { gain, ..map }
         };
         let source = |source| match source {

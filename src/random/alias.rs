@@ -145,7 +145,10 @@ mod tests {
             assert_eq!(odds.iter().map(|&o| u64::from(o)).sum::<u64>(), 1 << 32);
             for (&odds, weight) in odds.iter().zip(&weights) {
                 let exact = weight / total * 2f64.powi(32);
-                assert!((f64::from(odds) - exact).abs() < 1.0 && (*weight > 0.0 || odds == 0), "{odds} {exact}");
+                assert!(
+                    (f64::from(odds) - exact).abs() < 1.0 && (*weight > 0.0 || odds == 0),
+                    "{odds} {exact}"
+                );
             }
             let shares = Alias::new(&odds).shares();
             assert!(

@@ -392,7 +392,8 @@ impl RecipeBuilder {
             return Err(RecipeError::CentresAnd { name, other });
         }
         let (count, unit) = (centres.shares.len(), centres.unit());
-        let (mixture, left_out) = centres.within(half_spaces).ok_or(RecipeError::NoCentres { name, count })?;
+        let (mixture, left_out) =
+            centres.within(half_spaces).ok_or(RecipeError::NoCentres { name, count })?;
         let program = Program { proposal: Some(Proposal::Centres(mixture)), ..program.in_units(unit) };
         let (acceptance, max_attempts) = (pilot(&program), program.max_attempts);
         if failure(acceptance, max_attempts) > TOLERABLE_FAILURE {

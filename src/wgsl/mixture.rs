@@ -21,7 +21,8 @@ impl Mixture<f32> {
 
     /// The lines that read the centre which a word chooses, in straight-line code: `word` is the expression for it.
     pub(super) fn read(&self, word: &str) -> String {
-        let rows = (0..self.rows_of_each()).map(|r| format!("\nlet c{r} = bitcast<vec4<f32>>(proposal_row(row + {r}u));"));
+        let rows = (0..self.rows_of_each())
+            .map(|r| format!("\nlet c{r} = bitcast<vec4<f32>>(proposal_row(row + {r}u));"));
         format!("let row = choose({word});{}", rows.collect::<String>())
     }
 

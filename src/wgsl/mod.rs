@@ -374,9 +374,8 @@ mod tests {
         let level = IntensityLaw::LogUniform { low: 0.15, octaves: 10.0 };
         let lamp = || Program { intensity: Some(level.clone()), ..light() };
         let lamps = || Program { intensity: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..light() };
-        let about = |spread, program| {
-            Program { proposal: Some(Proposal::Centres(mixture(2, spread))), ..program }
-        };
+        let about =
+            |spread, program| Program { proposal: Some(Proposal::Centres(mixture(2, spread))), ..program };
         let generated = |program: &Program, target| {
             let tables = Tables::new(program);
             let text = arithmetic(program, &tables, Arithmetic::Plain, None)
@@ -399,11 +398,7 @@ mod tests {
                 with_all(surface(None), Layout::PaddedRows, Dtype::F16),
                 Dialect::Int64,
             ),
-            (
-                "kernel",
-                about(Spread::Same(0.3), only(surface(None), Quantity::Weights)),
-                Dialect::Baseline,
-            ),
+            ("kernel", about(Spread::Same(0.3), only(surface(None), Quantity::Weights)), Dialect::Baseline),
             (
                 "mixture",
                 about(Spread::Own(vec![0.25; 6]), only(surface(None), Quantity::Weights)),

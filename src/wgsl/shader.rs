@@ -136,7 +136,8 @@ pub(crate) fn shader_without(
         parts.push(table + "fn number(i: u32) -> f32 { return tables[i]; }\n");
     }
     if program.proposal.is_some() {
-        let rows = format!("@group(0) @binding({PROPOSAL_AT}) var<storage, read> proposal: array<vec4<u32>>;\n\n");
+        let rows =
+            format!("@group(0) @binding({PROPOSAL_AT}) var<storage, read> proposal: array<vec4<u32>>;\n\n");
         parts.push(rows + "fn proposal_row(i: u32) -> vec4<u32> { return proposal[i]; }\n");
         if !program.is_covered() {
             parts.push("fn proposal_word(i: u32) -> u32 { return proposal[i / 4u][i % 4u]; }\n".to_owned());

@@ -6,8 +6,8 @@
 use std::sync::OnceLock;
 
 use spectroll::{
-    ArithmeticChoice, BuiltinTable, Dataset, Engine, EngineChoice, Extrapolation, Fit, FitDistribution, Grid, Model,
-    Recipe, RecipeBuilder, SpectrumKind,
+    ArithmeticChoice, BuiltinTable, Dataset, Engine, EngineChoice, Extrapolation, Fit, FitDistribution, Grid,
+    Model, Recipe, RecipeBuilder, SpectrumKind,
 };
 
 /// The best adapter, or the one that `WGPU_ADAPTER_NAME` picks; without one, tests fail.

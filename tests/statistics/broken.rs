@@ -115,7 +115,11 @@ impl Centres {
         let total = *wrong.last()?;
         Some(Centres {
             coordinates: (0..weights.nrows()).map(|i| DVector::from_fn(k, |j, _| coordinate(i, j))).collect(),
-            bandwidth: if fault == Some(Fault::BandwidthSquared) { bandwidth * bandwidth } else { *bandwidth },
+            bandwidth: if fault == Some(Fault::BandwidthSquared) {
+                bandwidth * bandwidth
+            } else {
+                *bandwidth
+            },
             columns,
             wrong: wrong.into_iter().map(|sum| sum / total).collect(),
         })

@@ -11,7 +11,9 @@ use std::path::PathBuf;
 use serde::Serialize;
 use spectroll::evaluation::comparison::ComparisonFigures;
 use spectroll::wording::{grouped, wrapped};
-use spectroll::{Bounds, CoverSize, Distribution, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind};
+use spectroll::{
+    Bounds, CoverSize, Distribution, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind,
+};
 
 mod comparison;
 
