@@ -45,7 +45,7 @@ const MUNSELL_VRHEL: Family = Family {
     fitted: &[],
     grid: "400:10:700",
     method: ResampleMethod::Interpolate,
-    bandwidth: Some(0.354),
+    bandwidth: Some(0.306),
 };
 
 const GRANADA: Family = Family {
@@ -57,7 +57,7 @@ const GRANADA: Family = Family {
     ],
     grid: "400:10:700",
     method: ResampleMethod::Interpolate,
-    bandwidth: Some(0.309),
+    bandwidth: Some(0.209),
 };
 
 const MACBETH: Family = Family { tables: &[BuiltinTable::Macbeth], bandwidth: None, ..MUNSELL_VRHEL };

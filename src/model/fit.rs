@@ -37,7 +37,8 @@ pub enum FitDistribution {
     #[default]
     Gaussian,
     /// A normal distribution about each measured spectrum, with this bandwidth; where it is `None`, with the one under
-    /// which the spectra are most likely, each judged by the others' truncated density.
+    /// which the spectra are most likely, each judged by the others' truncated density of the components that have
+    /// 99 % of the variance.
     Kernel(Option<f64>),
     /// This many normal distributions, by expectation maximisation.
     Mixture(usize),
@@ -226,7 +227,10 @@ impl FitDistribution {
         let distribution = match self {
             FitDistribution::Gaussian => Distribution::Gaussian,
             FitDistribution::Kernel(bandwidth) => {
-                let auto = || mixture::bandwidth(&model.whitened(&weights), k, &model.half_spaces());
+                let auto = || {
+                    let judged = most_of(&model.parts().explained_variance);
+                    mixture::bandwidth(&model.whitened(&weights), [k, judged], &model.half_spaces())
+                };
                 Distribution::Kernel { bandwidth: bandwidth.unwrap_or_else(auto), weights }
             }
             FitDistribution::Mixture(normals) => {
@@ -242,6 +246,19 @@ impl FitDistribution {
         };
         model.with_distribution(distribution).expect("it was made for the model")
     }
+}
+
+/// The share of the variance in a model that the components have by which a bandwidth is judged.
+const MOST: f64 = 0.99;
+
+/// Number of the first components that explain nearly all that a model does.
+fn most_of(explained: &[f64]) -> usize {
+    let all: f64 = explained.iter().sum();
+    let sums = explained.iter().scan(0.0, |sum, share| {
+        *sum += share;
+        Some(*sum)
+    });
+    sums.take_while(|sum| *sum < MOST * all).count() + 1
 }
 
 /// The weights of centred spectra, a column each; of the weights, a row each. Sums in one order, so that they are the same
