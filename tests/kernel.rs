@@ -322,7 +322,7 @@ fn what_would_change_the_shares_is_refused() {
         (kernel_surfaces().xyz([0.3, 0.3, 0.3]), "target tristimulus values"),
         (kernel_surfaces().proposal(ProposalKind::Cover), "a cover"),
         (kernel_surfaces().lrv(0.2..0.6).bounds(Bounds::Scaled), "a target of each draw's own"),
-        (kernel_surfaces().given(sensors), "a model that is not Gaussian"),
+        (kernel_surfaces().given(sensors), "responses that each draw is given"),
     ] {
         let refused = builder.build().unwrap_err().to_string();
         assert!(refused.contains(other), "{refused}");

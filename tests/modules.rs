@@ -12,8 +12,8 @@ use engines::{gpu_is_software, kernel_at, kernel_surfaces, lamps, lamps_at, ligh
 use rand::RngExt;
 use spectroll::wgpu::{self, BufferUsages};
 use spectroll::{
-    Arithmetic, Bounds, Grid, Intensity, Model, ModuleOptions, ProposalKind, Quantity, Recipe, RecipeBuilder,
-    SpectrumKind, Stream, StreamRng, TableStorage, WgslError,
+    Arithmetic, Bounds, Distribution, Grid, Intensity, Model, ModuleOptions, ProposalKind, Quantity, Recipe,
+    RecipeBuilder, SpectrumKind, Stream, StreamRng, TableStorage, WgslError,
 };
 
 /// Number of draws of a recipe.
@@ -167,7 +167,12 @@ fn a_host_draws_what_the_cpu_draws() {
                 values.into_iter().chain([drawn.status().attempts()])
             })
             .collect();
-        let fits = recipe.tables().len() <= ModuleOptions::MOST_CONSTANT_BYTES;
+        let is_gaussian = *recipe.model().distribution() == Distribution::Gaussian;
+        let fits = recipe.keeps_tables_constant();
+        if !is_gaussian {
+            let constant = ModuleOptions { tables: Some(TableStorage::Const), ..ModuleOptions::default() };
+            assert_eq!(recipe.wgsl_with("spectrum", constant), Err(WgslError::ConstantCentres), "{name}");
+        }
         for arithmetic in [Arithmetic::Plain, Arithmetic::Exact] {
             // Other adapters may have other bytes in the plain form.
             if arithmetic == Arithmetic::Plain && !gpu_is_software() {

@@ -39,7 +39,7 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
         ("kernel", reflected(kernel_surfaces())),
         ("kernel, LRV 0.6, scaled", reflected(kernel_surfaces()).lrv(0.6).bounds(Bounds::Scaled)),
         ("kernel, LRV of its own", reflected(kernel_surfaces()).lrv(0.2..0.6)),
-        ("mixture of lamps", shining(lamps()).intensity(Intensity::LogUniform(0.15, 150.0))),
+        ("lights of a mixture", shining(lamps()).intensity(Intensity::LogUniform(0.15, 150.0))),
         ("log-uniform lights", shining(lights()).intensity(Intensity::LogUniform(0.15, 150.0))),
         ("measured lights", shining(lights()).intensity(Intensity::Data)),
         ("lights of intensity 3", shining(lights()).intensity(Intensity::Fixed(3.0))),

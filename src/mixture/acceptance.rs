@@ -60,7 +60,7 @@ fn normals(k: usize, each: usize) -> Vec<Vec<f64>> {
     coordinates
 }
 
-/// What a half-space sees of the normals, where all centres have the same spread; nothing elsewhere.
+/// Products of a half-space and all normals, where all centres have the same spread; nothing elsewhere.
 struct Bound {
     seen: Vec<f64>,
     most: f64,

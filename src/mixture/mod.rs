@@ -37,7 +37,7 @@ const LEAST_UNIT: f64 = 1e-6;
 /// Standard deviations of candidates about centres.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Spread {
-    /// The same about all, in every direction.
+    /// One about all, in every direction.
     Same(f64),
     /// The rows of a lower triangular factor for each centre: k (k + 1) / 2 numbers.
     Own(Vec<f64>),

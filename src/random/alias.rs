@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn nearest_odds_are_within_a_word_of_exact_ones() {
         for count in [2, 3, 1000, 1024, 1 << 16] {
-            let weights: Vec<f64> = (0..count).map(|i| (f64::from(i) * 7.7).sin().max(0.0)).collect();
+            let weights: Vec<f64> = (1..=count).map(|i| (f64::from(i) * 7.7).sin().max(0.0)).collect();
             let odds = nearest_odds(&weights);
             let total: f64 = weights.iter().sum();
             assert_eq!(odds.iter().map(|&o| u64::from(o)).sum::<u64>(), 1 << 32);

@@ -471,10 +471,13 @@ impl RecipeBuilder {
             ("target tristimulus values", self.xyz.is_some()),
             ("an intensity", self.intensity.is_some()),
             ("a cover", self.proposal == ProposalKind::Cover),
-            ("a model that is not Gaussian", *self.model.distribution() != Distribution::Gaussian),
         ];
         if let Some((other, _)) = others.into_iter().find(|(_, is_set)| *is_set) {
             return Err(RecipeError::GivenAnd { other });
+        }
+        if *self.model.distribution() != Distribution::Gaussian {
+            let (name, other) = (self.model.distribution().name(), "responses that each draw is given");
+            return Err(RecipeError::CentresAnd { name, other });
         }
         let grid = self.model.grid();
         let seen = match self.model.kind() {

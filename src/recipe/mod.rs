@@ -310,6 +310,11 @@ impl Recipe {
         wgsl::table_words(&self.program).into_iter().flat_map(u32::to_le_bytes).collect()
     }
 
+    /// Whether its module keeps these tables in a constant unless [`ModuleOptions`] say otherwise.
+    pub fn keeps_tables_constant(&self) -> bool {
+        wgsl::keeps_tables_constant(&self.program)
+    }
+
     /// Writes the compute shader that makes the draws, with its bindings and the bytes that go into them, for hosts on any
     /// graphics interface. On wgpu, [`Sampler`](crate::Sampler) does all that.
     ///

@@ -31,7 +31,7 @@ fn candidate(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Can
     return Candidate(Normals({}), cost < chi_square({}));
 }}
 ",
-            choice(&self.alias, k + 1, "return proposal_row(c * ROWS).xy;"),
+            choice(&self.alias, k + 1, "let row = proposal_row(c * ROWS);\n    return vec2(row.x, row.y);"),
             blocks.collect::<String>(),
             word(0),
             coordinates.collect::<String>(),

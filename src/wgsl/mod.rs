@@ -31,7 +31,7 @@ mod writer;
 
 pub use compute_shader::{Binding, BindingRole, ComputeShader, ShaderVariant};
 pub use module::{ModuleOptions, TableStorage, WgslError};
-pub(crate) use module::{module, table_words};
+pub(crate) use module::{keeps_tables_constant, module, table_words};
 #[cfg_attr(not(feature = "report"), allow(unreachable_pub))]
 pub use part::Part;
 pub use self_test::ArithmeticTrait;

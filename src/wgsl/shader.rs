@@ -139,7 +139,7 @@ pub(crate) fn shader_without(
         let rows =
             format!("@group(0) @binding({PROPOSAL_AT}) var<storage, read> proposal: array<vec4<u32>>;\n\n");
         parts.push(rows + "fn proposal_row(i: u32) -> vec4<u32> { return proposal[i]; }\n");
-        if !program.is_covered() {
+        if let Some(Proposal::Centres(_)) = program.proposal {
             parts.push("fn proposal_word(i: u32) -> u32 { return proposal[i / 4u][i % 4u]; }\n".to_owned());
         }
     }

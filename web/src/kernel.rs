@@ -47,7 +47,7 @@ impl Kernel {
             let (role, quantity) = match binding.role {
                 BindingRole::Parameters => ("parameters", None),
                 BindingRole::Tables => ("tables", None),
-                BindingRole::Cover => ("cover", None),
+                BindingRole::Proposal => ("proposal", None),
                 BindingRole::Progress => ("progress", None),
                 BindingRole::Output(quantity) => ("output", Some(quantity.name())),
                 other => unreachable!("a shader of a range has no {other:?}"),

@@ -38,7 +38,7 @@ fn utf_16(bytes: &[u8], word: fn([u8; 2]) -> u16) -> Cow<'_, str> {
     Cow::Owned(String::from_utf16_lossy(&units))
 }
 
-/// What tells encodings apart is in the headings.
+/// Text in the encoding that its bytes look like: what tells encodings apart is in the headings.
 #[cfg(feature = "encodings")]
 fn guess(bytes: &[u8]) -> (Cow<'_, str>, &'static str) {
     let mut detector = chardetng::EncodingDetector::new(chardetng::Iso2022JpDetection::Deny);

@@ -89,7 +89,7 @@ export class Gpu {
     const bindings = JSON.parse(kernel.bindings());
     device.pushErrorScope("validation");
     const module = device.createShaderModule({ label: "spectroll", code: kernel.text() });
-    const type = { parameters: "uniform", tables: "read-only-storage", cover: "read-only-storage", progress: "storage", output: "storage" };
+    const type = { parameters: "uniform", tables: "read-only-storage", proposal: "read-only-storage", progress: "storage", output: "storage" };
     const layout = device.createBindGroupLayout({
       entries: bindings.map(({ binding, role }) => ({ binding, visibility: GPUShaderStage.COMPUTE, buffer: { type: type[role] } })),
     });
@@ -107,7 +107,7 @@ export class Gpu {
     const fixed = new Map();
     for (const { binding, role } of bindings) {
       const bytes = kernel.contents(binding);
-      if (bytes.length === 0 || !["tables", "cover"].includes(role)) continue;
+      if (bytes.length === 0 || !["tables", "proposal"].includes(role)) continue;
       const buffer = device.createBuffer({ size: bytes.length, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST });
       device.queue.writeBuffer(buffer, 0, bytes);
       fixed.set(binding, buffer);
