@@ -14,7 +14,7 @@ pub(crate) struct Normal {
     pub(crate) covariance: DMatrix<f64>,
 }
 
-/// What is added to each variance, of 1 of all data, so that no distribution falls onto a point or a plane.
+/// Addition to each variance, which is 1 of all data, so that no distribution falls onto a point or a plane.
 const FLOOR: f64 = 1e-4;
 
 /// The most rounds, and the gain in the mean log likelihood below which they end.

@@ -615,7 +615,7 @@ impl RecipeBuilder {
     }
 }
 
-/// What makes the acceptance of a centre differ from draw to draw.
+/// Setting under which the acceptance about a centre differs from draw to draw.
 pub(super) const OWN_TARGETS: &str = "bounds on what is scaled to a target of each draw's own";
 
 /// The law of a target, if its values are those of one.

@@ -81,6 +81,13 @@ for (const engine of ["webgpu", "cpu"]) {
   });
 }
 
+/** Whether two values of a model are the same but for rounding. */
+function alike(ours, theirs, name) {
+  if (Array.isArray(ours)) ours.forEach((value, i) => alike(value, theirs[i], `${name}[${i}]`));
+  else if (typeof ours === "number") assert.ok(Math.abs(ours - theirs) <= 1e-12, `${name}: ${ours} and ${theirs}`);
+  else assert.equal(ours, theirs, name);
+}
+
 test("text, models and shaders are the program's too", async () => {
   const page = await open(browser, server.address, { hash: "#components=7&lrv=0.3&count=500" });
   const text = await download(page, "#get-csv");
@@ -88,7 +95,9 @@ test("text, models and shaders are the program's too", async () => {
   assert.ok(text.bytes.equals(readFileSync(join(folder, "draws.csv"))));
   const model = await download(page, "#get-model");
   assert.equal(model.name, "munsell-vrhel-7.json");
-  assert.ok(model.bytes.equals(readFileSync(join(folder, model.name))));
+  // Matrix products round once where the processor can, and twice in WebAssembly: a fit may differ in its last digits.
+  const theirs = JSON.parse(readFileSync(join(folder, model.name)));
+  for (const [name, value] of Object.entries(JSON.parse(model.bytes))) alike(value, theirs[name], name);
   const shader = await download(page, "#get-wgsl");
   run("spectroll shader munsell-vrhel-7.json --lrv 0.3 -o mine.wgsl", folder);
   assert.ok(shader.bytes.equals(readFileSync(join(folder, "mine.wgsl"))));
