@@ -45,4 +45,4 @@ mkdir -p "$out"
 cp -R web/page/. "$out/"
 "$bindgen" --target web --no-typescript --remove-name-section --out-dir "$out/library" --out-name spectroll "$module"
 bytes=$(cd "$out" && find . -type f -print0 | sort -z | xargs -0 -n1 gzip -9c | wc -c)
-echo "$out: $bytes bytes compressed"
+echo "$out: $bytes bytes by gzip"

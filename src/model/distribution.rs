@@ -192,7 +192,7 @@ impl Model {
 
     /// Bounds of physical spectra, as half-spaces of the standard normals.
     pub(crate) fn half_spaces(&self) -> Vec<HalfSpace> {
-        let spectra = (&self.parts.basis).tr_mul(&self.weight_factor());
+        let spectra = self.parts.basis.tr_mul(&self.weight_factor());
         let centre = self.reconstruct(self.parts.weight_mean.as_slice());
         let bound = |band: usize, sign: f64, room: f64| {
             HalfSpace::new(band, spectra.row(band).iter().map(|gain| sign * gain).collect(), room)

@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn percentages_name_the_control_that_mends_them() {
         let refused = read("{}").fit(r#"{"components":1,"kind":"reflectance","wavelengths":"400:10:420"}"#);
-        let refusal = refused.err().expect("30 is no reflectance");
+        let refusal = refused.expect_err("30 is no reflectance");
         assert_eq!(refusal.control, Some("percent"), "{refusal}");
     }
 
