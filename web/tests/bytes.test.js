@@ -98,6 +98,7 @@ test("text, models and shaders are the program's too", async () => {
   // Matrix products round once where the processor can, and twice in WebAssembly: a fit may differ in its last digits.
   const theirs = JSON.parse(readFileSync(join(folder, model.name)));
   for (const [name, value] of Object.entries(JSON.parse(model.bytes))) alike(value, theirs[name], name);
+  writeFileSync(join(folder, model.name), model.bytes);
   const shader = await download(page, "#get-wgsl");
   run("spectroll shader munsell-vrhel-7.json --lrv 0.3 -o mine.wgsl", folder);
   assert.ok(shader.bytes.equals(readFileSync(join(folder, "mine.wgsl"))));

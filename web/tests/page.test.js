@@ -209,7 +209,7 @@ test("settings that cannot be drawn say why", async () => {
     ["#seed=x", /the seed is "x"/i],
     ["#count=0", /the number of draws is "0"/i],
     ["#count=2000000", /this page makes 1 to 1,000,000/],
-    ["#model=granada&intensity=5..2", /Intensit/],
+    ["#model=granada&intensity=5..2", /intensit/i],
   ]) {
     await go(page, hash);
     assert.match(await page.textContent("#draw-refusal"), expected, hash);
