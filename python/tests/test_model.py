@@ -115,7 +115,7 @@ def test_distributions_have_settings_of_their_own(csv):
     ]:
         with pytest.raises(ValueError, match=said):
             fit(**settings)
-    with pytest.raises(spectroll.DataError, match="a bandwidth of 2"):
+    with pytest.raises(ValueError, match="a bandwidth of 2"):
         fit(distribution="kernel", bandwidth=2.0)
 
 

@@ -73,8 +73,9 @@ pub fn builtins() -> String {
         first_nm: f64,
         last_nm: f64,
     }
-    // A name with a grid in it is another model of the same data, which the page has another control for.
-    let names = Model::BUILTIN.iter().filter(|name| !name.ends_with("nm"));
+    // A name with a grid in it is another model of the same data, which the page has another control for; one with a kernel
+    // has a distribution that a fit of the page does not give.
+    let names = Model::BUILTIN.iter().filter(|name| !name.ends_with("nm") && !name.ends_with("-kernel"));
     let row = |name: &'static str| {
         let data = Model::builtin_data(name).expect("it is built in");
         Row { name, kind: data.kind, spectra: data.spectra, first_nm: data.first, last_nm: data.last }
