@@ -1,5 +1,6 @@
 # Each target does its own set-up: what is missing is installed on Debian and Ubuntu, and named elsewhere.
-.PHONY: demo test test-swiftshader test-python wheel notebook exhaustive faults fuzz mutants bench adapter driver python
+.PHONY: demo test test-swiftshader test-python web web-build web-test wheel notebook exhaustive faults fuzz mutants bench
+.PHONY: adapter driver python
 .DEFAULT_GOAL := demo
 
 VENV := target/venv
@@ -32,6 +33,21 @@ $(SWIFTSHADER): scripts/swiftshader.sh
 # The Python package: its wheel, installed into a fresh environment.
 test-python: driver python
 	@sh scripts/wheel.sh $(VENV) target/wheel -m 'not slow'
+
+# The page, served on this machine alone: its address is printed. PORT picks the port.
+PORT ?= 8000
+web: web-build
+	python3 web/serve.py target/page $(PORT)
+
+# The page as files, in target/page.
+web-build:
+	@bash web/build.sh
+
+# The page in a real browser, with WebGPU on a software adapter, against the files that the program writes.
+web-test: web-build
+	cargo build --locked --release
+	@sh web/browser.sh
+	cd web/tests && npm ci --silent --no-audit --no-fund && npm test
 
 # A wheel for any Linux with glibc 2.17 or newer, with Zig as its linker; elsewhere, one for this system.
 wheel: python

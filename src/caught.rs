@@ -1,13 +1,16 @@
 //! Panics of other people's parsers: on a damaged file they are an error of the file, and nobody wants to read them.
 
 use std::cell::Cell;
-use std::panic::{self, AssertUnwindSafe, catch_unwind};
+use std::panic;
+#[cfg(any(feature = "hdf5", feature = "parquet", feature = "spreadsheets"))]
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 thread_local! {
     static IS_PARSING: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Runs a parser that may panic on this thread; `None` where it did.
+#[cfg(any(feature = "hdf5", feature = "parquet", feature = "spreadsheets"))]
 pub(crate) fn caught<T>(parse: impl FnOnce() -> T) -> Option<T> {
     let before = IS_PARSING.replace(true);
     let parsed = catch_unwind(AssertUnwindSafe(parse)).ok();

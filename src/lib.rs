@@ -24,9 +24,10 @@ mod quantity;
 
 mod random;
 
-mod model;
-
 mod cover;
+mod mixture;
+
+mod model;
 
 mod program;
 
@@ -86,7 +87,10 @@ pub use metamers::{
     Answer, AnswerCounts, ColourConversion, ColourSpace, HardColours, MetamerError, MetamerWindow, Metamers,
     UnreachableColours,
 };
-pub use model::{BuiltinData, Fit, FitError, MAX_COMPONENTS, Model, ModelError, ModelParts, Normalization};
+pub use model::{
+    BuiltinData, Distribution, Fit, FitDistribution, FitError, MAX_COMPONENTS, MixtureComponent, Model,
+    ModelError, ModelParts, Normalization,
+};
 pub use program::Bounds;
 pub use quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
 pub use random::philox::philox;

@@ -8,12 +8,12 @@ mod engines;
 mod host;
 
 use buffers::read;
-use engines::{gpu_is_software, lights, surfaces};
+use engines::{gpu_is_software, kernel_at, kernel_surfaces, lamps, lamps_at, lights, surfaces};
 use rand::RngExt;
 use spectroll::wgpu::{self, BufferUsages};
 use spectroll::{
-    Arithmetic, Bounds, Grid, Intensity, Model, ModuleOptions, ProposalKind, Quantity, Recipe, RecipeBuilder,
-    SpectrumKind, Stream, StreamRng, TableStorage, WgslError,
+    Arithmetic, Bounds, Distribution, Grid, Intensity, Model, ModuleOptions, ProposalKind, Quantity, Recipe,
+    RecipeBuilder, SpectrumKind, Stream, StreamRng, TableStorage, WgslError,
 };
 
 /// Number of draws of a recipe.
@@ -47,6 +47,9 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
         ("colour", surfaces().xyz([0.3, 0.3, 0.3])),
         ("cover", scaled(0.99)),
         ("cover of a wide model", surfaces().covariance_scale(25.0).proposal(ProposalKind::Cover)),
+        ("kernel", kernel_surfaces()),
+        ("kernel, scaled", kernel_surfaces().lrv(0.6).bounds(Bounds::Scaled)),
+        ("mixture", lamps()),
         ("light", lights()),
         ("log-uniform", lights().intensity(Intensity::LogUniform(0.15, 150.0))),
         ("of the data", lights().intensity(Intensity::Data)),
@@ -55,6 +58,8 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
         ("uneven", uneven_surfaces()),
         ("in loops", surfaces_at("400:1:700", 7)),
         ("in loops, a target for each", surfaces_at("400:1:700", 8).lrv(0.2..0.6).bounds(Bounds::Scaled)),
+        ("in loops, a kernel", kernel_at("400:1:700", 8)),
+        ("in loops, a mixture", lamps_at("400:1:700", 9)),
         ("in loops, a cover", surfaces_at("400:1:700", 8).lrv(0.97).bounds(Bounds::Scaled)),
     ];
     let built = |(name, builder): (&'static str, RecipeBuilder)| {
@@ -162,7 +167,12 @@ fn a_host_draws_what_the_cpu_draws() {
                 values.into_iter().chain([drawn.status().attempts()])
             })
             .collect();
-        let fits = recipe.tables().len() <= ModuleOptions::MOST_CONSTANT_BYTES;
+        let is_gaussian = *recipe.model().distribution() == Distribution::Gaussian;
+        let fits = recipe.keeps_tables_constant();
+        if !is_gaussian {
+            let constant = ModuleOptions { tables: Some(TableStorage::Const), ..ModuleOptions::default() };
+            assert_eq!(recipe.wgsl_with("spectrum", constant), Err(WgslError::ConstantCentres), "{name}");
+        }
         for arithmetic in [Arithmetic::Plain, Arithmetic::Exact] {
             // Other adapters may have other bytes in the plain form.
             if arithmetic == Arithmetic::Plain && !gpu_is_software() {

@@ -3,7 +3,7 @@
 
 mod engines;
 
-use engines::{cpu, forms, gpu, gpu_is_software, lights, surfaces};
+use engines::{cpu, forms, gpu, gpu_is_software, kernel_surfaces, lamps, lights, surfaces};
 use spectroll::{
     ArrayFormat, Bounds, DrawRange, Dtype, Engine, EngineError, Illuminant, Intensity, Layout, Lrv,
     ProposalKind, Quantity, Recipe, RecipeBuilder, Stream, XyzScale, colorimetry,
@@ -36,6 +36,10 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
             "LRV of its own, from a cover",
             reflected(surfaces()).lrv(0.2..0.6).covariance_scale(25.0).proposal(ProposalKind::Cover),
         ),
+        ("kernel", reflected(kernel_surfaces())),
+        ("kernel, LRV 0.6, scaled", reflected(kernel_surfaces()).lrv(0.6).bounds(Bounds::Scaled)),
+        ("kernel, LRV of its own", reflected(kernel_surfaces()).lrv(0.2..0.6)),
+        ("lights of a mixture", shining(lamps()).intensity(Intensity::LogUniform(0.15, 150.0))),
         ("log-uniform lights", shining(lights()).intensity(Intensity::LogUniform(0.15, 150.0))),
         ("measured lights", shining(lights()).intensity(Intensity::Data)),
         ("lights of intensity 3", shining(lights()).intensity(Intensity::Fixed(3.0))),

@@ -20,13 +20,13 @@ def models() -> list[str]:
 
 
 class Model:
-    """A Gaussian model of spectra: a spectrum is `mean + weights @ basis`, and the weights are normal.
+    """A model of spectra: a spectrum is `mean + weights @ basis`, and the weights are normal, or distributed as the measured ones.
 
     Parameters
     ----------
     name : str or path
-        A built-in model ("munsell-vrhel": reflectances of Munsell papers and natural surfaces; "granada": daylights), or a
-        model file. `Model.fit` makes models of your own spectra.
+        A built-in model ("munsell-vrhel": reflectances of Munsell papers and natural surfaces; "granada": daylights; with
+        "-kernel" after it, as varied as the measured spectra), or a model file. `Model.fit` makes models of your own spectra.
     wavelengths : array in nm, or text as in "380:5:780", optional
         Where a built-in model is fitted (400:10:700).
 
@@ -65,6 +65,9 @@ class Model:
         kind: str | None = None,
         components: int | float = 6,
         normalize: str | None = None,
+        distribution: str = "gaussian",
+        bandwidth: float | None = None,
+        mixture_components: int | None = None,
         at: Wavelengths | None = None,
         resample: str = "auto",
         missing: str = "error",
@@ -87,6 +90,13 @@ class Model:
             Number of principal components, or the share of the variance that they are to explain.
         normalize : "mean", "integral" or "none"
             What each spectrum is divided by; illuminants by their mean power unless this says otherwise.
+        distribution : "gaussian", "kernel" or "mixture"
+            How the weights are distributed: normal, as in the appendix; a normal distribution about each measured spectrum,
+            which keeps draws as varied as the data; or a few normal distributions.
+        bandwidth : float from 0 (the spectra themselves) to 1 (the Gaussian), optional
+            The width of a kernel; without one, that under which the spectra are most likely.
+        mixture_components : int, optional
+            The number of normal distributions of a mixture (3).
         at : array in nm, or text
             The wavelengths of the model, even or not, where they are others than those of the first spectra; "as-measured"
             leaves out those at which nothing was measured.
@@ -123,6 +133,7 @@ class Model:
             count,
             share,
             normalize,
+            (distribution, bandwidth, mixture_components),
             onto(resample, missing, extrapolate),
         )
         return cls._of(native)
@@ -160,6 +171,16 @@ class Model:
     def kind(self) -> str:
         """"reflectance" or "illuminant"."""
         return self._native.kind
+
+    @property
+    def distribution(self) -> str:
+        """"gaussian", "kernel" or "mixture": how the weights are distributed before what is not physical is rejected."""
+        return self._native.distribution
+
+    @property
+    def bandwidth(self) -> float | None:
+        """The width of a kernel, from 0 to 1; None of other distributions."""
+        return self._native.bandwidth
 
     @property
     def components(self) -> int:

@@ -7,7 +7,10 @@ use pyo3::prelude::*;
 
 use spectroll::output::IfExists;
 use spectroll::suggestion::closest;
-use spectroll::{Dataset, Fit, Grid, Model as Fitted, ModelError, Normalization, SpectrumKind, Table};
+use spectroll::{
+    Dataset, Distribution, Fit, FitDistribution, Grid, Model as Fitted, ModelError, Normalization,
+    SpectrumKind, Table,
+};
 
 use crate::data::Onto;
 use crate::error::{self, Error, Result};
@@ -63,10 +66,11 @@ impl Model {
         components: Option<usize>,
         explain: Option<f64>,
         normalize: Option<&str>,
+        weights: (&str, Option<f64>, Option<usize>),
         onto: Onto,
     ) -> PyResult<Model> {
         let kind = self::kind(kind)?;
-        let mut fit = Fit::new(kind);
+        let mut fit = Fit::new(kind).distribution(distribution(weights)?);
         if let Some(components) = components {
             fit = fit.components(components);
         }
@@ -97,6 +101,19 @@ impl Model {
     #[getter]
     fn kind(&self) -> String {
         self.model.kind().to_string()
+    }
+
+    #[getter]
+    fn distribution(&self) -> &'static str {
+        self.model.distribution().name()
+    }
+
+    #[getter]
+    fn bandwidth(&self) -> Option<f64> {
+        match self.model.distribution() {
+            Distribution::Kernel { bandwidth, .. } => Some(*bandwidth),
+            _ => None,
+        }
     }
 
     #[getter]
@@ -211,6 +228,28 @@ fn normalization(name: &str) -> Result<Normalization> {
     let all =
         [("mean", Normalization::Mean), ("integral", Normalization::Integral), ("none", Normalization::None)];
     choice("normalize", name, &all)
+}
+
+/// The number of normal distributions of a mixture, unless another is asked for.
+const MIXTURE_COMPONENTS: usize = 3;
+
+/// The distribution of a name, with a bandwidth or a number of normal distributions.
+fn distribution((name, bandwidth, normals): (&str, Option<f64>, Option<usize>)) -> Result<FitDistribution> {
+    let all = ["gaussian", "kernel", "mixture"].map(|name| (name, name));
+    let name = choice("distribution", name, &all)?;
+    if bandwidth.is_some() && name != "kernel" {
+        return Err(error::value(format!("bandwidth= belongs to distribution=\"kernel\", not to {name:?}")));
+    }
+    if normals.is_some() && name != "mixture" {
+        return Err(error::value(format!(
+            "mixture_components= belongs to distribution=\"mixture\", not to {name:?}"
+        )));
+    }
+    Ok(match name {
+        "kernel" => FitDistribution::Kernel(bandwidth),
+        "mixture" => FitDistribution::Mixture(normals.unwrap_or(MIXTURE_COMPONENTS)),
+        _ => FitDistribution::Gaussian,
+    })
 }
 
 /// The value of a name among some, or a `ValueError` that lists them.

@@ -174,9 +174,8 @@ impl Sampler {
 
     /// The content of the buffer that the module declares; empty where it declares none.
     fn tables<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        let tables = self.recipe.tables();
-        let is_declared = tables.len() > ModuleOptions::MOST_CONSTANT_BYTES;
-        PyBytes::new(py, if is_declared { &tables } else { &[] })
+        let is_declared = !self.recipe.keeps_tables_constant();
+        PyBytes::new(py, &if is_declared { self.recipe.tables() } else { Vec::new() })
     }
 
     /// Draws a range of a source, a seed and the name of a stream, into the bytes of an array for each format. Returns the

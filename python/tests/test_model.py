@@ -89,6 +89,36 @@ def test_fits_take_their_settings(csv):
     assert len(two.sources) == 2
 
 
+def test_draws_are_as_varied_as_the_data():
+    gaussian, kernel = Model("munsell-vrhel"), Model("munsell-vrhel-kernel")
+    assert (gaussian.distribution, gaussian.bandwidth, kernel.distribution) == ("gaussian", None, "kernel")
+    measured = gaussian.project(np.concatenate([spectroll.read(name).at("400:10:700").values for name in ("munsell", "vrhel")]))
+    drawn = [model.project(Sampler(model, engine="cpu").draw(20_000)) for model in (gaussian, kernel)]
+    shifts = [abs(weights[:, 0].mean() - measured[:, 0].mean()) / measured[:, 0].std() for weights in drawn]
+    assert shifts[0] > 0.3 and shifts[1] < 0.12
+    assert pickle.loads(pickle.dumps(kernel)) == kernel
+
+
+def test_distributions_have_settings_of_their_own(csv):
+    read = spectroll.read(csv)
+
+    def fit(**settings):
+        return Model.fit(read, kind="reflectance", components=2, **settings)
+
+    assert fit(distribution="kernel", bandwidth=0.5).bandwidth == 0.5
+    assert 0 < fit(distribution="kernel").bandwidth <= 1
+    assert fit(distribution="mixture", mixture_components=2).distribution == "mixture"
+    for settings, said in [
+        ({"bandwidth": 0.5}, 'belongs to distribution="kernel"'),
+        ({"distribution": "kernel", "mixture_components": 2}, 'belongs to distribution="mixture"'),
+        ({"distribution": "kernal"}, 'did you mean "kernel"'),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            fit(**settings)
+    with pytest.raises(ValueError, match="a bandwidth of 2"):
+        fit(distribution="kernel", bandwidth=2.0)
+
+
 def test_files_are_read_with_the_settings_of_the_program(tmp_path):
     grid = np.arange(400, 701, 50)
     values = np.random.default_rng(3).uniform(0.2, 0.8, (5, 7)).round(3)

@@ -151,7 +151,7 @@ pub(super) fn remedy(error: &anyhow::Error) -> &'static str {
     if matches!(error.downcast_ref(), Some(ModelError::BuiltinRange { .. })) {
         return " (--wavelengths; `spectroll fit` takes other data)";
     }
-    if matches!(error.downcast_ref(), Some(WgslError::LargeTable { .. })) {
+    if matches!(error.downcast_ref(), Some(WgslError::LargeTable { .. } | WgslError::ConstantCentres)) {
         return " (--tables buffer)";
     }
     let engine = error.downcast_ref::<EngineError>().or(match error.downcast_ref::<ExportError>() {

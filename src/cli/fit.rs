@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use spectroll::output::write_file;
 use spectroll::wording::counted;
 use spectroll::{
-    Dataset, Extrapolation, Fit, Grid, Missing, Model, Normalization, ResampleMethod, Resampling,
-    SpectraCounts, SpectrumKind, Table,
+    Dataset, Distribution, Extrapolation, Fit, FitDistribution, Grid, Missing, Model, Normalization,
+    ResampleMethod, Resampling, SpectraCounts, SpectrumKind, Table,
 };
 
 use super::exit::Usage;
@@ -50,6 +50,17 @@ pub(crate) struct Arguments {
     /// Treat wavelengths outside a spectrum's measurements as
     #[arg(long, value_enum, default_value = "error")]
     extrapolate: Extrapolation,
+    /// Distribution of the weights: a Gaussian, a normal distribution about each spectrum, which keeps draws to the shape of
+    /// the data (kernel), or a few of them (mixture)
+    #[arg(long, value_enum, default_value = "gaussian")]
+    distribution: DistributionKind,
+    /// The width of each spectrum's normal distribution, from 0 (the spectra themselves) to 1 (the Gaussian); auto takes
+    /// that under which the spectra are most likely [default: auto]
+    #[arg(long, value_name = "H|auto", value_parser = bandwidth, allow_hyphen_values = true)]
+    bandwidth: Option<Bandwidth>,
+    /// The number of normal distributions of a mixture [default: 3]
+    #[arg(short = 'g', long, value_name = "G")]
+    mixture_components: Option<usize>,
     /// The model file
     #[arg(short, long, value_name = "MODEL.json")]
     output: PathBuf,
@@ -58,6 +69,56 @@ pub(crate) struct Arguments {
     force: bool,
     #[command(flatten)]
     data: DataArguments,
+}
+
+/// Kind of a distribution.
+#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
+enum DistributionKind {
+    Gaussian,
+    Kernel,
+    Mixture,
+}
+
+/// Bandwidth of a kernel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Bandwidth {
+    Auto,
+    Fixed(f64),
+}
+
+fn bandwidth(text: &str) -> Result<Bandwidth, String> {
+    match text.parse() {
+        Ok(bandwidth) => Ok(Bandwidth::Fixed(bandwidth)),
+        Err(_) if text == "auto" => Ok(Bandwidth::Auto),
+        Err(_) => Err("expected auto, or a number from 0 to 1".to_owned()),
+    }
+}
+
+/// The number of normal distributions of a mixture, unless another is asked for.
+const MIXTURE_COMPONENTS: usize = 3;
+
+impl Arguments {
+    /// The distribution that is asked for.
+    fn distribution(&self) -> anyhow::Result<FitDistribution> {
+        let needs =
+            |option: &str, kind: &str| Err(Usage(format!("{option} needs --distribution {kind}")).into());
+        match (self.distribution, self.bandwidth, self.mixture_components) {
+            (DistributionKind::Gaussian | DistributionKind::Mixture, Some(_), _) => {
+                needs("--bandwidth", "kernel")
+            }
+            (DistributionKind::Gaussian | DistributionKind::Kernel, _, Some(_)) => {
+                needs("--mixture-components", "mixture")
+            }
+            (DistributionKind::Gaussian, ..) => Ok(FitDistribution::Gaussian),
+            (DistributionKind::Kernel, Some(Bandwidth::Fixed(bandwidth)), _) => {
+                Ok(FitDistribution::Kernel(Some(bandwidth)))
+            }
+            (DistributionKind::Kernel, ..) => Ok(FitDistribution::Kernel(None)),
+            (DistributionKind::Mixture, _, normals) => {
+                Ok(FitDistribution::Mixture(normals.unwrap_or(MIXTURE_COMPONENTS)))
+            }
+        }
+    }
 }
 
 /// Size of a model.
@@ -86,6 +147,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ))
         .into());
     }
+    let distribution = arguments.distribution()?;
     let given = match &arguments.wavelengths {
         Some(Wavelengths::Grid(grid)) => Some(grid.clone()),
         Some(Wavelengths::AsMeasured) | None => None,
@@ -110,6 +172,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Components::Count(components) => Fit::new(kind).components(components),
         Components::Share(share) => Fit::new(kind).explain(share),
     };
+    fit = fit.distribution(distribution);
     if let Some(normalize) = arguments.normalize {
         fit = fit.normalization(normalize);
     }
@@ -146,6 +209,9 @@ fn report(model: &Model, data: &Dataset, path: &Path) {
     );
     for note in data.notes() {
         tell!("  {note}");
+    }
+    if *model.distribution() != Distribution::Gaussian {
+        tell!("  {}", model.distribution());
     }
 }
 

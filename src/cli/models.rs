@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for [name, kind, spectra, grid, measured, explained] in
         std::iter::once(head.map(str::to_owned)).chain(rows.iter().map(cells))
     {
-        writeln!(out, "{name:<18} {kind:<12} {spectra:>7}  {grid:<11} {measured:<13} {explained}")?;
+        writeln!(out, "{name:<20} {kind:<11} {spectra:>7}  {grid:<10} {measured:<12} {explained}")?;
     }
     Ok(())
 }

@@ -89,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let place = match arguments.tables {
         Some(TablePlace::Const) => Some(TableStorage::Const),
         Some(TablePlace::Buffer) => Some(buffer),
-        None if tables.len() > ModuleOptions::MOST_CONSTANT_BYTES => Some(buffer),
+        None if !recipe.keeps_tables_constant() => Some(buffer),
         None => None,
     };
     let options = ModuleOptions { arithmetic: arguments.arithmetic, tables: place };

@@ -2,7 +2,7 @@
 //!
 //! An attempt's words, block by block: the first chooses a box, one follows for each axis, and the last thins.
 
-use super::alias::Alias;
+use crate::random::alias::Alias;
 use crate::random::real::Real;
 use crate::random::stream::Blocks;
 

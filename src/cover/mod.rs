@@ -10,7 +10,6 @@
 //! The half-spaces are open and the boxes closed, but faces have no probability; what a box loses or gains by
 //! rounding to f32 is 1e-7 of it. A draw's physical test is the same as without a cover, on the same f32 spectrum.
 
-mod alias;
 mod frame;
 mod half_space;
 mod hat;
@@ -20,7 +19,6 @@ mod simplex;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use alias::{Alias, odds};
 use hat::Axis;
 use partition::partition;
 #[cfg(test)]
@@ -31,6 +29,7 @@ pub(crate) use frame::Frame;
 pub(crate) use half_space::{HalfSpace, REACH};
 pub(crate) use mixture::BoxMixture;
 
+use crate::random::alias::{Alias, odds};
 #[cfg(test)]
 use crate::random::stream::Stream;
 

@@ -210,7 +210,8 @@ mod tests {
 
     /// Recipes of every kind, some of whose draws fail.
     fn recipes() -> Vec<(Recipe, u32)> {
-        let [surface, light] = ["munsell-vrhel", "granada"].map(|name| Model::builtin(name).unwrap());
+        let [surface, light, kernel] =
+            ["munsell-vrhel", "granada", "munsell-vrhel-kernel"].map(|name| Model::builtin(name).unwrap());
         let surface = || Recipe::builder(&surface);
         let all_but = |builder: RecipeBuilder, quantity| {
             builder.quantities(Quantity::ALL.iter().copied().filter(|q| *q != quantity))
@@ -237,6 +238,7 @@ mod tests {
                 2,
             ),
             recipe(surface().spectra_dtype(Dtype::F16), 100),
+            recipe(lit(Recipe::builder(&kernel)), 100),
         ]
     }
 

@@ -23,10 +23,9 @@ use lanes::{Done, Lanes};
 use target::LrvTarget;
 
 use crate::affine::Affine;
-use crate::cover::BoxMixture;
 use crate::dataset::SpectrumKind;
 use crate::draw_status::DrawStatus;
-use crate::program::{self, IntensityLaw, Program, Source};
+use crate::program::{self, IntensityLaw, Program, Proposal, Source};
 use crate::quantity::{ArrayFormat, ValueRange};
 use crate::random::real::Real;
 use crate::random::stream::{self, Attempts, Blocks, DrawRange, Draws, Stream};
@@ -38,7 +37,7 @@ pub(crate) struct Kernel<R> {
     intensity: Option<IntensityLaw<R>>,
     /// Whether a word of a draw's own has a part in it.
     reads_draw_block: bool,
-    proposal: Option<BoxMixture<R>>,
+    proposal: Option<Proposal<R>>,
     /// Upper limit of a physical value before scaling.
     limit: R,
     tests_scaled: bool,
@@ -151,7 +150,7 @@ impl<R: Real> Kernel<R> {
             target: program.target.as_ref().map(LrvTarget::new),
             intensity: program.intensity.as_ref().map(IntensityLaw::rounded),
             reads_draw_block: program.reads_draw_block(),
-            proposal: program.proposal.as_ref().map(BoxMixture::rounded),
+            proposal: program.proposal.as_ref().map(Proposal::rounded),
             limit,
             tests_scaled: program.tests_scaled(),
             may_exceed_one: program.may_exceed_one(),
@@ -259,14 +258,26 @@ impl<R: Real> Kernel<R> {
 
     /// Proposes candidates, of the words of `from`. Returns whether each is to be judged.
     #[inline(always)]
-    fn propose<const L: usize>(&self, candidates: &mut Candidates<R, L>, from: impl Blocks<L>) -> [bool; L] {
+    fn propose<const L: usize>(
+        &self,
+        candidates: &mut Candidates<R, L>,
+        mut from: impl Blocks<L>,
+    ) -> [bool; L] {
         match &self.proposal {
-            Some(proposal) => proposal.propose(&mut candidates.normals, from),
+            Some(Proposal::Boxes(boxes)) => return boxes.propose(&mut candidates.normals, from),
+            Some(Proposal::Centres(mixture)) => {
+                let mut words = make_normals(&mut candidates.normals, &mut from);
+                let word = mixture.choice() % 4;
+                if word == 0 {
+                    words = from.block(mixture.choice() as u32 / 4);
+                }
+                mixture.place(&mut candidates.normals, &words[word]);
+            }
             None => {
-                make_normals(&mut candidates.normals[self.given..], from);
-                [true; L]
+                make_normals(&mut candidates.normals[self.given..], &mut from);
             }
         }
+        [true; L]
     }
 }
 
@@ -316,15 +327,17 @@ fn floored<R: Real>(value: R) -> R {
     if value > R::FLOOR { value } else { R::FLOOR }
 }
 
-/// The normals of the words of each block: four a block, two a pair of words.
+/// The normals of the words of each block: four a block, two a pair of words. Returns the words of the last.
 #[inline(always)]
-fn make_normals<R: Real, const L: usize>(normals: &mut [[R; L]], mut from: impl Blocks<L>) {
+fn make_normals<R: Real, const L: usize>(normals: &mut [[R; L]], from: &mut impl Blocks<L>) -> [[u32; L]; 4] {
+    let mut words = [[0; L]; 4];
     for (b, normals) in normals.chunks_mut(4).enumerate() {
-        let words = from.block(b as u32);
+        words = from.block(b as u32);
         for (normals, words) in normals.chunks_exact_mut(2).zip(words.chunks_exact(2)) {
             for l in 0..L {
                 [normals[0][l], normals[1][l]] = R::normal_pair(words[0][l], words[1][l]);
             }
         }
     }
+    words
 }

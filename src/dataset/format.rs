@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::arrays::choose;
 use super::reading::{ReadOptions, Reading};
-use super::{DatasetError, envi, files, folder, hdf5_bytes, mat, npy, npz, spdx, spreadsheet, text};
+use super::{DatasetError, envi, files, folder, hdf5_bytes, mat, npy, npz, spdx, text};
 
 /// Endings of the names of tables, for those who ask without opening one.
 const ENDINGS: [&str; 30] = [
@@ -39,7 +39,15 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
     if path.is_dir() {
         return folder::read(path, options);
     }
-    let bytes = files::read(path)?;
+    from_bytes(path, files::read(path)?, options)
+}
+
+/// Reads the bytes of a file; `path` is what messages call it, and where files are looked for that belong to it.
+pub(super) fn from_bytes(
+    path: &Path,
+    bytes: Vec<u8>,
+    options: &ReadOptions,
+) -> Result<Reading, DatasetError> {
     if is_hdf5(&bytes) {
         return choose(path, hdf5_bytes(path, bytes)?, options);
     }
@@ -52,13 +60,13 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
     if bytes.starts_with(b"PK") {
         return match npz::kind(&bytes) {
             npz::Archive::Npz => choose(path, npz::arrays(path, &bytes)?, options),
-            npz::Archive::Spreadsheet => spreadsheet::read(path, &bytes, options),
+            npz::Archive::Spreadsheet => spreadsheet(path, &bytes, options),
             npz::Archive::Other => Err(unknown(path, "an archive", "unpack it first")),
         };
     }
     // A workbook of before 2007.
     if bytes.starts_with(b"\xd0\xcf\x11\xe0") {
-        return spreadsheet::read(path, &bytes, options);
+        return spreadsheet(path, &bytes, options);
     }
     if let Some((_, found, advice)) = OTHERS.iter().find(|(start, ..)| bytes.starts_with(start)) {
         return Err(unknown(path, found, advice));
@@ -112,6 +120,16 @@ fn is_binary(bytes: &[u8]) -> bool {
     controls * 50 > sample.len() || zeros * 5 > sample.len() * 3
 }
 
+#[cfg(feature = "spreadsheets")]
+fn spreadsheet(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Reading, DatasetError> {
+    super::spreadsheet::read(path, bytes, options)
+}
+
+#[cfg(not(feature = "spreadsheets"))]
+fn spreadsheet(path: &Path, _: &[u8], _: &ReadOptions) -> Result<Reading, DatasetError> {
+    Err(not_built(path, "a spreadsheet", "this build leaves out spreadsheets: save the sheet as .csv"))
+}
+
 #[cfg(feature = "parquet")]
 fn parquet(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Reading, DatasetError> {
     super::parquet::read(path, bytes, options)
@@ -123,7 +141,7 @@ fn parquet(path: &Path, _: Vec<u8>, _: &ReadOptions) -> Result<Reading, DatasetE
 }
 
 /// The error of a format that this build leaves out.
-#[cfg_attr(all(feature = "parquet", feature = "hdf5"), allow(dead_code))]
+#[cfg_attr(all(feature = "parquet", feature = "hdf5", feature = "spreadsheets"), allow(dead_code))]
 pub(super) fn not_built(path: &Path, format: &'static str, reason: &str) -> DatasetError {
     DatasetError::Format { path: path.to_owned(), format, reason: reason.to_owned() }
 }

@@ -27,6 +27,7 @@ mod reading;
 mod resample;
 mod sheet;
 mod spdx;
+#[cfg(feature = "spreadsheets")]
 mod spreadsheet;
 mod table;
 mod text;

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 
 use super::reading::{ReadOptions, Reading};
-use super::{DatasetError, Remedy, SpectrumKind, axis, format};
+use super::{DatasetError, MAX_BYTES, Remedy, SpectrumKind, axis, format};
 use crate::grid::{self, Grid};
 use crate::wording::counted;
 
@@ -115,7 +115,33 @@ impl Table {
     /// Reads a file of spectra, and says how it was read.
     pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Reading, DatasetError> {
         let path = path.as_ref();
-        let mut reading = format::read(path, options)?;
+        Ok(Table::marked(path, format::read(path, options)?, options))
+    }
+
+    /// Reads the bytes of a file of spectra, at most 512 MiB, where a host has them and no file system, as a browser
+    /// does. `name` is the name of the file, in messages and in models; that of a format never decides what it is.
+    ///
+    /// ```
+    /// use spectroll::{ReadOptions, Table};
+    ///
+    /// let text = b"nm,a,b\n400,0.1,0.2\n410,0.2,0.3\n420,0.3,0.2\n";
+    /// let reading = Table::from_bytes("mine.csv", text.to_vec(), &ReadOptions::default())?;
+    /// assert_eq!((reading.table.len(), reading.table.spectrum(1)), (2, &[0.2, 0.3, 0.2][..]));
+    /// # Ok::<(), spectroll::DatasetError>(())
+    /// ```
+    pub fn from_bytes(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Reading, DatasetError> {
+        let path = Path::new(name);
+        if bytes.is_empty() {
+            return Err(DatasetError::Empty { path: path.to_owned() });
+        }
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(DatasetError::TooLarge { path: path.to_owned() });
+        }
+        Ok(Table::marked(path, format::from_bytes(path, bytes, options)?, options))
+    }
+
+    /// The reading of a file with its name in models, and with values marked as missing as asked for.
+    fn marked(path: &Path, mut reading: Reading, options: &ReadOptions) -> Reading {
         let table = &mut reading.table;
         let (full, file) =
             (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy());
@@ -132,7 +158,7 @@ impl Table {
             let marked = counted(marked, "value", "values");
             reading.notes.push(format!("marked {marked} as missing, as asked for"));
         }
-        Ok(reading)
+        reading
     }
 
     /// Whether the name of a file is that of a table, by its extension.

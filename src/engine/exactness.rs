@@ -127,7 +127,7 @@ pub(super) fn sampler(
 fn sum(shader: &ComputeShader) -> blake3::Hash {
     let mut hasher = blake3::Hasher::new();
     hasher.update(shader.text().as_bytes());
-    for role in [BindingRole::Tables, BindingRole::Cover] {
+    for role in [BindingRole::Tables, BindingRole::Proposal] {
         hasher.update(shader.contents(role).unwrap_or_default());
     }
     hasher.finalize()

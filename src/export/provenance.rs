@@ -1,6 +1,7 @@
 //! Provenance that a data set records: sums that tell whether two programs would draw the same.
 
 use crate::model::Model;
+use crate::program::Proposal;
 use crate::recipe::Recipe;
 use crate::wgsl::{self, Dialect};
 
@@ -17,7 +18,7 @@ pub fn shader_sum(recipe: &Recipe) -> String {
     for value in tables.values {
         hasher.update(&value.to_le_bytes());
     }
-    for word in recipe.program().proposal.iter().flat_map(|p| p.rounded::<f32>().words()).flatten() {
+    for word in recipe.program().proposal.iter().flat_map(Proposal::words).flatten() {
         hasher.update(&word.to_le_bytes());
     }
     hasher.finalize().to_hex().to_string()

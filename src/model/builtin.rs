@@ -1,6 +1,7 @@
 //! The models that are built in, and the data that they are fitted to.
 
-use super::{Fit, Model, ModelError};
+use super::fit::projected;
+use super::{Fit, FitDistribution, Model, ModelError};
 use crate::dataset::{BuiltinTable, Dataset, ResampleMethod, Resampling, SpectrumKind, Table};
 use crate::grid::Grid;
 
@@ -33,6 +34,9 @@ struct Family {
     /// Averages of data where they are finer than a grid would change the draws of the models that came first; lamps with
     /// lines need them.
     method: ResampleMethod,
+    /// Bandwidth of the model whose name ends in `-kernel`, if there is one: what a fit finds on that grid
+    /// ([`FitDistribution::Kernel`]). The shape of the data is much the same on others.
+    bandwidth: Option<f64>,
 }
 
 const MUNSELL_VRHEL: Family = Family {
@@ -41,6 +45,7 @@ const MUNSELL_VRHEL: Family = Family {
     fitted: &[],
     grid: "400:10:700",
     method: ResampleMethod::Interpolate,
+    bandwidth: Some(0.306),
 };
 
 const GRANADA: Family = Family {
@@ -52,24 +57,26 @@ const GRANADA: Family = Family {
     ],
     grid: "400:10:700",
     method: ResampleMethod::Interpolate,
+    bandwidth: Some(0.209),
 };
 
-const MACBETH: Family = Family { tables: &[BuiltinTable::Macbeth], ..MUNSELL_VRHEL };
+const MACBETH: Family = Family { tables: &[BuiltinTable::Macbeth], bandwidth: None, ..MUNSELL_VRHEL };
 
-const KOIVISTO: Family = Family { tables: &[BuiltinTable::Koivisto], ..MUNSELL_VRHEL };
+const KOIVISTO: Family = Family { tables: &[BuiltinTable::Koivisto], ..MACBETH };
 
-const KRINOV: Family = Family { tables: &[BuiltinTable::Krinov], grid: "400:10:650", ..MUNSELL_VRHEL };
+const KRINOV: Family = Family { tables: &[BuiltinTable::Krinov], grid: "400:10:650", ..MACBETH };
 
 const HOUSER: Family = Family {
     kind: SpectrumKind::Illuminant,
     tables: &[BuiltinTable::Houser],
     method: ResampleMethod::Average,
-    ..MUNSELL_VRHEL
+    ..MACBETH
 };
 
 impl Model {
     /// The names of the built-in models. `-5nm` is the grid 400:5:700, `krinov` is at 400:10:650 and the others are at
-    /// 400:10:700.
+    /// 400:10:700. `-kernel` is the same model with a normal distribution about each measured spectrum
+    /// ([`Distribution::Kernel`](super::Distribution::Kernel)).
     pub const BUILTIN: &[&str] = &[
         "munsell-vrhel",
         "granada",
@@ -79,6 +86,8 @@ impl Model {
         "koivisto",
         "krinov",
         "houser",
+        "munsell-vrhel-kernel",
+        "granada-kernel",
     ];
 
     /// A built-in model: `granada` (daylights, with or without `-5nm`) was fitted once to the measurements of
@@ -121,13 +130,15 @@ impl Model {
     }
 }
 
-/// The family of a name, and the grid that the name stands for.
+/// The family of a name, without a bandwidth where the name does not end in `-kernel`, and the grid that it stands for.
 fn family(name: &str) -> Result<(Family, Grid), ModelError> {
-    let (family, suffix) = match name.strip_suffix("-5nm") {
-        Some(family) => (family, true),
-        None => (name, false),
+    let stripped = |name: &'_ str, suffix| match name.strip_suffix(suffix) {
+        Some(rest) => (rest.to_owned(), true),
+        None => (name.to_owned(), false),
     };
-    let found = match (family, suffix) {
+    let (family, is_kernel) = stripped(name, "-kernel");
+    let (family, suffix) = stripped(&family, "-5nm");
+    let mut found = match (family.as_str(), suffix) {
         ("munsell-vrhel", _) => MUNSELL_VRHEL,
         ("granada", _) => GRANADA,
         ("macbeth", false) => MACBETH,
@@ -136,32 +147,55 @@ fn family(name: &str) -> Result<(Family, Grid), ModelError> {
         ("houser", false) => HOUSER,
         _ => return Err(ModelError::NoBuiltin { name: name.to_owned() }),
     };
+    match (is_kernel, found.bandwidth) {
+        (true, None) => return Err(ModelError::NoBuiltin { name: name.to_owned() }),
+        (true, Some(_)) => {}
+        (false, _) => found.bandwidth = None,
+    }
     let grid = if suffix { "400:5:700" } else { found.grid };
     Ok((found, grid.parse()?))
 }
 
 impl Family {
     fn at(&self, name: &str, grid: Grid) -> Result<Model, ModelError> {
-        if let Some((_, text)) = self.fitted.iter().find(|(fitted, _)| fitted.parse().as_ref() == Ok(&grid)) {
-            return Model::from_json(name, text);
+        match self.fitted.iter().find(|(fitted, _)| fitted.parse().as_ref() == Ok(&grid)) {
+            Some((_, text)) => self.distributed(name, Model::from_json(name, text)?),
+            None => self.fit(name, grid, None),
         }
-        self.fit(name, grid, None)
     }
 
     fn fit(&self, name: &str, grid: Grid, components: Option<usize>) -> Result<Model, ModelError> {
+        let data = self.dataset(name, &grid)?;
+        let fit = Fit::new(self.kind);
+        let fit = components.map_or(fit, |components| fit.components(components)).fit(&data);
+        let name = name.to_owned();
+        let model =
+            fit.map_err(|source| ModelError::BuiltinFit { name: name.clone(), grid, source: source.into() })?;
+        self.distributed(&name, model)
+    }
+
+    /// The model with the distribution that its name says.
+    fn distributed(&self, name: &str, model: Model) -> Result<Model, ModelError> {
+        let Some(bandwidth) = self.bandwidth else { return Ok(model) };
+        let (grid, parts) = (model.grid().clone(), model.parts());
+        let divided = parts.normalization.divide(&self.dataset(name, &grid)?);
+        let name = name.to_owned();
+        let (mut spectra, _) =
+            divided.map_err(|source| ModelError::BuiltinFit { name, grid, source: source.into() })?;
+        spectra.column_iter_mut().for_each(|mut spectrum| spectrum -= &parts.mean);
+        Ok(FitDistribution::Kernel(Some(bandwidth)).of(&model, projected(&parts.basis, &spectra)))
+    }
+
+    fn dataset(&self, name: &str, grid: &Grid) -> Result<Dataset, ModelError> {
         let tables = self.tables();
         let BuiltinData { first, last, .. } = self.data(&tables);
-        let name = || name.to_owned();
         let settings = Resampling::default().method(self.method);
-        let data = Dataset::new(&tables, grid.clone(), settings).map_err(|_| ModelError::BuiltinRange {
-            name: name(),
+        Dataset::new(&tables, grid.clone(), settings).map_err(|_| ModelError::BuiltinRange {
+            name: name.to_owned(),
             first,
             last,
             grid: grid.clone(),
-        })?;
-        let fit = Fit::new(self.kind);
-        let fit = components.map_or(fit, |components| fit.components(components)).fit(&data);
-        fit.map_err(|source| ModelError::BuiltinFit { name: name(), grid, source: Box::new(source) })
+        })
     }
 
     fn tables(&self) -> Vec<Table> {

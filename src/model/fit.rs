@@ -4,8 +4,10 @@
 use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::decomposition::Decomposition;
+use super::distribution::{Distribution, MixtureComponent};
 use crate::dataset::{Dataset, SpectrumKind, Unphysical};
 use crate::grid::Grid;
+use crate::mixture;
 use crate::model::{MAX_COMPONENTS, Model, ModelParts, Normalization};
 use crate::wording::counted;
 
@@ -24,6 +26,22 @@ pub struct Fit {
     kind: SpectrumKind,
     size: Size,
     normalization: Normalization,
+    distribution: FitDistribution,
+}
+
+/// Distribution of the weights that a [`Fit`] gives a model: see [`Distribution`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum FitDistribution {
+    /// One normal distribution, as in the appendix.
+    #[default]
+    Gaussian,
+    /// A normal distribution about each measured spectrum, with this bandwidth; where it is `None`, with the one under
+    /// which the spectra are most likely, each judged by the others' truncated density of the components that have
+    /// 99 % of the variance.
+    Kernel(Option<f64>),
+    /// This many normal distributions, by expectation maximisation.
+    Mixture(usize),
 }
 
 /// Number of components to keep.
@@ -65,6 +83,14 @@ pub enum FitError {
     NotReflectances { mean: f64 },
     #[error(transparent)]
     Unphysical(#[from] Unphysical),
+    #[error(
+        "a bandwidth of {0}: it is from 0, which repeats the measured spectra, to 1, which is the Gaussian"
+    )]
+    Bandwidth(f64),
+    #[error(
+        "a mixture of {normals} of {spectra} spectra: it takes at least 1, and at most half as many as spectra"
+    )]
+    Normals { normals: usize, spectra: usize },
     #[error("the principal components of these data could not be found to 1e-10: please report the data")]
     Decomposition,
     #[error("the values are too large or too small to square in f64: rescale the data, or normalise")]
@@ -78,7 +104,7 @@ impl Fit {
             SpectrumKind::Illuminant => Normalization::Mean,
             SpectrumKind::Reflectance => Normalization::None,
         };
-        Fit { kind, size: Size::Components(6), normalization }
+        Fit { kind, size: Size::Components(6), normalization, distribution: FitDistribution::Gaussian }
     }
 
     /// Keeps `components` principal components (k).
@@ -97,6 +123,11 @@ impl Fit {
         Fit { normalization, ..self }
     }
 
+    /// Gives the weights this distribution.
+    pub fn distribution(self, distribution: FitDistribution) -> Fit {
+        Fit { distribution, ..self }
+    }
+
     /// Fits the model.
     pub fn fit(&self, data: &Dataset) -> Result<Model, FitError> {
         let (bands, spectra) = data.spectra().shape();
@@ -108,6 +139,15 @@ impl Fit {
         };
         if spectra < least + 1 {
             return Err(FitError::TooFewSpectra { components: least, spectra });
+        }
+        match self.distribution {
+            FitDistribution::Kernel(Some(bandwidth)) if !(0.0..=1.0).contains(&bandwidth) => {
+                return Err(FitError::Bandwidth(bandwidth));
+            }
+            FitDistribution::Mixture(normals) if !(1..=spectra / 2).contains(&normals) => {
+                return Err(FitError::Normals { normals, spectra });
+            }
+            _ => {}
         }
         let (mut centred, powers) = self.normalization.divide(data)?;
         let mean = centred.mean();
@@ -138,7 +178,7 @@ impl Fit {
         if !scale.is_finite() {
             return Err(FitError::Scale);
         }
-        let Some(Decomposition { values, basis }) = Decomposition::of(&(centred * scale)) else {
+        let Some(Decomposition { values, basis }) = Decomposition::of(&(&centred * scale)) else {
             return Err(FitError::Decomposition);
         };
         let singular = values / scale;
@@ -160,20 +200,73 @@ impl Fit {
         }
         // In the principal frame the weights have mean zero and a diagonal covariance (eq. 4, with 1/M).
         let variances = singular.rows(0, k).map(|s| s * s / spectra as f64);
-        Ok(Model::new(ModelParts {
+        let basis = basis.rows(0, k).into_owned();
+        let weights = projected(&basis, &centred);
+        let model = Model::new(ModelParts {
             kind: self.kind,
             grid: data.grid().clone(),
             mean,
-            basis: basis.rows(0, k).into_owned(),
+            basis,
             weight_mean: DVector::zeros(k),
             weight_covariance: DMatrix::from_diagonal(&variances),
             explained_variance: singular.iter().take(k).map(|s| s * s / total).collect(),
             normalization: self.normalization,
             powers,
+            distribution: Distribution::Gaussian,
             sources: data.sources().to_vec(),
-        })
-        .expect("singular vectors are orthonormal and variances are not negative"))
+        });
+        let model = model.expect("singular vectors are orthonormal and variances are not negative");
+        Ok(self.distribution.of(&model, weights))
     }
+}
+
+impl FitDistribution {
+    /// The model with its weights so distributed, where those of the data are these, a row each.
+    pub(super) fn of(self, model: &Model, weights: DMatrix<f64>) -> Model {
+        let k = model.components();
+        let distribution = match self {
+            FitDistribution::Gaussian => Distribution::Gaussian,
+            FitDistribution::Kernel(bandwidth) => {
+                let auto = || {
+                    let judged = most_of(&model.parts().explained_variance);
+                    mixture::bandwidth(&model.whitened(&weights), [k, judged], &model.half_spaces())
+                };
+                Distribution::Kernel { bandwidth: bandwidth.unwrap_or_else(auto), weights }
+            }
+            FitDistribution::Mixture(normals) => {
+                let (factor, mean) = (model.weight_factor(), &model.parts().weight_mean);
+                let component = |normal: mixture::Normal| MixtureComponent {
+                    share: normal.share,
+                    mean: mean + &factor * normal.mean,
+                    covariance: &factor * normal.covariance * factor.transpose(),
+                };
+                let found = mixture::normals(&model.whitened(&weights), k, normals);
+                Distribution::Mixture(found.into_iter().map(component).collect())
+            }
+        };
+        model.with_distribution(distribution).expect("it was made for the model")
+    }
+}
+
+/// The share of the variance in a model that the components have by which a bandwidth is judged.
+const MOST: f64 = 0.99;
+
+/// Number of the first components that explain nearly all that a model does.
+fn most_of(explained: &[f64]) -> usize {
+    let all: f64 = explained.iter().sum();
+    let sums = explained.iter().scan(0.0, |sum, share| {
+        *sum += share;
+        Some(*sum)
+    });
+    sums.take_while(|sum| *sum < MOST * all).count() + 1
+}
+
+/// The weights of centred spectra, a column each; of the weights, a row each. Sums in one order, so that they are the same
+/// to the last bit on every machine.
+pub(super) fn projected(basis: &DMatrix<f64>, centred: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(centred.ncols(), basis.nrows(), |spectrum, component| {
+        (0..basis.ncols()).map(|band| basis[(component, band)] * centred[(band, spectrum)]).sum()
+    })
 }
 
 impl Normalization {

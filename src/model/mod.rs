@@ -10,10 +10,14 @@ use serde::{Deserialize, Serialize};
 
 mod builtin;
 mod decomposition;
+mod distribution;
 mod fit;
 
 pub use builtin::BuiltinData;
-pub use fit::{Fit, FitError};
+pub use distribution::{Distribution, MixtureComponent};
+pub use fit::{Fit, FitDistribution, FitError};
+
+use distribution::DistributionRecord;
 
 use crate::dataset::{SpectrumKind, Table};
 use crate::grid::{Grid, GridError};
@@ -73,6 +77,8 @@ pub struct ModelParts {
     pub normalization: Normalization,
     /// Divisor of each of the spectra, positive; empty where they are not known or nothing was divided.
     pub powers: Vec<f64>,
+    /// Distribution of the weights.
+    pub distribution: Distribution,
     /// Sources of the data, a line each.
     pub sources: Vec<String>,
 }
@@ -107,6 +113,17 @@ pub enum ModelError {
         "basis vectors {row} and {column} have the product {product} where an orthonormal basis has {expected} (to 1e-5)"
     )]
     NotOrthonormal { row: usize, column: usize, product: f64, expected: f64 },
+    #[error(
+        "a distribution of {found} parts ({name}): there are 1 to {} of them; take a part of the spectra",
+        crate::mixture::MOST_CENTRES
+    )]
+    Centres { name: &'static str, found: usize },
+    #[error(
+        "a bandwidth of {0}: it is from 0, which repeats the measured spectra, to 1, which is the Gaussian"
+    )]
+    Bandwidth(f64),
+    #[error("a component of the mixture has the share {0}; it must be above 0")]
+    Share(f64),
     #[error("powers holds {0}; what spectra are divided by is finite and above 0")]
     Power(f64),
     #[error(
@@ -166,6 +183,7 @@ impl Model {
         if let Some(&value) = parts.powers.iter().find(|power| !(power.is_finite() && **power > 0.0)) {
             return Err(ModelError::Power(value));
         }
+        parts.distribution.check(k)?;
         let basis_correction = orthonormalise(&mut parts.basis)?;
         check_covariance(&parts.weight_covariance)?;
         // Halves that agree to rounding are made to agree exactly, so that a factor of either is the same.
@@ -339,6 +357,8 @@ struct File {
     normalization: Normalization,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     powers: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    distribution: Option<DistributionRecord>,
     sources: Vec<String>,
 }
 
@@ -356,6 +376,7 @@ impl File {
             explained_variance: parts.explained_variance.clone(),
             normalization: parts.normalization,
             powers: parts.powers.clone(),
+            distribution: DistributionRecord::of(&parts.distribution),
             sources: parts.sources.clone(),
         }
     }
@@ -364,6 +385,8 @@ impl File {
         if self.basis.is_empty() {
             return Err(ModelError::Components { components: 0, bands: self.wavelengths.len() });
         }
+        let k = self.basis.len();
+        let distribution = self.distribution.map(|record| record.into_distribution(k)).transpose()?;
         Ok(ModelParts {
             kind: self.kind,
             basis: matrix("basis", &self.basis, self.wavelengths.len())?,
@@ -374,6 +397,7 @@ impl File {
             explained_variance: self.explained_variance,
             normalization: self.normalization,
             powers: self.powers,
+            distribution: distribution.unwrap_or_default(),
             sources: self.sources,
         })
     }

@@ -323,7 +323,10 @@ pub(crate) fn available_space(path: &Path) -> Option<u64> {
         fs4::available_space(folder).ok().filter(|_| has_size)
     }
     #[cfg(not(any(unix, windows)))]
-    None
+    {
+        let _ = path;
+        None
+    }
 }
 
 /// Folder of the file that a path names.

@@ -174,7 +174,9 @@ impl Field {
 
     fn half(&self, value: f64) -> io::Result<f16> {
         let [least, largest] = self.range.map_or([f32::NEG_INFINITY, f32::INFINITY], ValueRange::halves);
-        let half = f16::from_f64(value.clamp(least.into(), largest.into()));
+        // By way of f32, in which values are drawn: without instructions for it, the crate's conversion from f64 drops low
+        // bits before it rounds, and takes a value just above a tie for one.
+        let half = f16::from_f32(value.clamp(least.into(), largest.into()) as f32);
         if half.is_infinite() && value.is_finite() {
             let (name, most) = (&self.name, f16::MAX);
             let what = format!("{name} of {value:e} do not fit float16, which ends at {most}: use float32");

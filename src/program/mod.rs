@@ -9,13 +9,15 @@
 pub(crate) mod condition;
 pub(crate) mod feasibility;
 pub(crate) mod mode;
+mod proposal;
 mod rule;
 
+pub(crate) use proposal::Proposal;
 pub use rule::Bounds;
 pub(crate) use rule::{IntensityLaw, LrvLaw, LrvTarget};
 
 use crate::affine::Affine;
-use crate::cover::{BoxMixture, Cover};
+use crate::cover::Cover;
 use crate::dataset::SpectrumKind;
 use crate::model::Model;
 use crate::quantity::{ArrayFormat, ValueRange};
@@ -61,8 +63,8 @@ pub(crate) struct Program {
     pub(crate) spectrum: Affine,
     pub(crate) target: Option<LrvTarget>,
     pub(crate) intensity: Option<IntensityLaw>,
-    /// Source of candidates, where it is not plain rejection: z is then in its coordinates, and so are all maps.
-    pub(crate) proposal: Option<BoxMixture<f64>>,
+    /// Source of candidates, where they are not plain normals: z is then in its coordinates, and so are all maps.
+    pub(crate) proposal: Option<Proposal<f64>>,
     /// Largest number of candidates of a draw, at least 1 and less than 2^31.
     pub(crate) max_attempts: u32,
     /// Outputs, in the order of [`Quantity`](crate::Quantity), each once.
@@ -110,6 +112,22 @@ impl Program {
         Program { spectrum: self.spectrum.at(responses), outputs, given: 0, ..self.clone() }
     }
 
+    /// Returns the program in normals of another unit, in standard deviations.
+    pub(crate) fn in_units(self, unit: f64) -> Program {
+        let scaled = |map: Affine| {
+            let gain =
+                map.gain.into_iter().map(|gain| gain.into_iter().map(|g| unit * g).collect()).collect();
+            Affine { gain, ..map }
+        };
+        let source = |source| match source {
+            Source::Map(map, Unit::Over(over)) => Source::Map(scaled(map), Unit::Over(scaled(over))),
+            Source::Map(map, unit) => Source::Map(scaled(map), unit),
+            other => other,
+        };
+        let outputs = self.outputs.into_iter().map(|o| Output { source: source(o.source), ..o }).collect();
+        Program { spectrum: scaled(self.spectrum), outputs, ..self }
+    }
+
     /// Returns the program with candidates from a cover.
     pub(crate) fn covered(self, cover: &Cover) -> Program {
         let frame = cover.frame();
@@ -122,7 +140,7 @@ impl Program {
         };
         let outputs = self.outputs.into_iter().map(|o| Output { source: turned(o.source), ..o }).collect();
         let spectrum = frame.turned(&self.spectrum);
-        Program { spectrum, outputs, proposal: Some(cover.proposal().clone()), ..self }
+        Program { spectrum, outputs, proposal: Some(Proposal::Boxes(cover.proposal().clone())), ..self }
     }
 
     /// Returns the program with statuses among its outputs.
@@ -144,6 +162,11 @@ impl Program {
 
     pub(crate) fn bands(&self) -> usize {
         self.spectrum.offset.len()
+    }
+
+    /// Whether candidates come from a cover.
+    pub(crate) fn is_covered(&self) -> bool {
+        matches!(self.proposal, Some(Proposal::Boxes(_)))
     }
 
     /// Number of components, those that are given included.

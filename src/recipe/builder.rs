@@ -11,10 +11,11 @@ use crate::colorimetry::{Illuminant, Observer};
 use crate::cover::Cover;
 use crate::cover::HalfSpace;
 use crate::dataset::SpectrumKind;
-use crate::model::Model;
+use crate::mixture::Centres;
+use crate::model::{Distribution, Model};
 use crate::program::condition::Condition;
 use crate::program::feasibility::{self, Room};
-use crate::program::{self, Bounds, IntensityLaw, LrvLaw, LrvTarget, Program};
+use crate::program::{self, Bounds, IntensityLaw, LrvLaw, LrvTarget, Program, Proposal};
 use crate::quantity::{Dtype, Layout, Quantity};
 use crate::sensors::{ResponseScale, SensorError, Sensors};
 
@@ -225,6 +226,9 @@ impl RecipeBuilder {
         }
         let half_spaces = feasibility::half_spaces(&program);
         let centre = self.centre(&program, &half_spaces)?;
+        if let Some(centres) = self.model.centres() {
+            return self.about_centres(program, centres, &half_spaces);
+        }
         if program.tests_own_targets() {
             return self.reject_by_own_targets(program);
         }
@@ -353,6 +357,7 @@ impl RecipeBuilder {
                     probability,
                     acceptance,
                     cover,
+                    left_out: 0,
                 });
             }
         } else if !may_be_plain {
@@ -365,6 +370,43 @@ impl RecipeBuilder {
             probability: plain,
             acceptance: plain,
             cover: None,
+            left_out: 0,
+        })
+    }
+
+    /// The recipe of a model whose weights are distributed about centres. What accepts or changes a part of them alone
+    /// would change their shares, and is refused.
+    fn about_centres(
+        self,
+        program: Program,
+        centres: Centres,
+        half_spaces: &[HalfSpace],
+    ) -> Result<Recipe, RecipeError> {
+        let name = self.model.distribution().name();
+        let others = [
+            ("target tristimulus values", self.xyz.is_some()),
+            ("a cover", self.proposal == ProposalKind::Cover),
+            (OWN_TARGETS, program.tests_own_targets()),
+        ];
+        if let Some((other, _)) = others.into_iter().find(|(_, is_set)| *is_set) {
+            return Err(RecipeError::CentresAnd { name, other });
+        }
+        let (count, unit) = (centres.shares.len(), centres.unit());
+        let (mixture, left_out) =
+            centres.within(half_spaces).ok_or(RecipeError::NoCentres { name, count })?;
+        let program = Program { proposal: Some(Proposal::Centres(mixture)), ..program.in_units(unit) };
+        let (acceptance, max_attempts) = (pilot(&program), program.max_attempts);
+        if failure(acceptance, max_attempts) > TOLERABLE_FAILURE {
+            return Err(RecipeError::Hopeless { acceptance, max_attempts });
+        }
+        Ok(Recipe {
+            settings: self.settings(),
+            model: self.model,
+            program,
+            probability: acceptance,
+            acceptance,
+            cover: None,
+            left_out,
         })
     }
 
@@ -391,6 +433,7 @@ impl RecipeBuilder {
             model: self.model,
             program,
             cover: None,
+            left_out: 0,
         })
     }
 
@@ -409,6 +452,7 @@ impl RecipeBuilder {
             model: self.model,
             program,
             cover: None,
+            left_out: 0,
         })
     }
 
@@ -430,6 +474,10 @@ impl RecipeBuilder {
         ];
         if let Some((other, _)) = others.into_iter().find(|(_, is_set)| *is_set) {
             return Err(RecipeError::GivenAnd { other });
+        }
+        if *self.model.distribution() != Distribution::Gaussian {
+            let (name, other) = (self.model.distribution().name(), "responses that each draw is given");
+            return Err(RecipeError::CentresAnd { name, other });
         }
         let grid = self.model.grid();
         let seen = match self.model.kind() {
@@ -566,6 +614,9 @@ impl RecipeBuilder {
         Ok(weights)
     }
 }
+
+/// Setting under which the acceptance about a centre differs from draw to draw.
+pub(super) const OWN_TARGETS: &str = "bounds on what is scaled to a target of each draw's own";
 
 /// The law of a target, if its values are those of one.
 fn law(

@@ -125,6 +125,16 @@ pub enum RecipeError {
     Empty { wavelengths: Vec<f64> },
     #[error("{}", no_cover(*components))]
     NoCover { components: usize },
+    #[error(
+        "a {name} model and {other}: some of what is measured would be drawn more often than the rest; use the Gaussian \
+         model of the same data"
+    )]
+    CentresAnd { name: &'static str, other: &'static str },
+    #[error(
+        "of the {count} normal distributions of this {name} model none has 1 spectrum in 64 that can be accepted: ask for \
+         less extreme spectra, or use the Gaussian model of the same data"
+    )]
+    NoCentres { name: &'static str, count: usize },
     #[error("{setting} needs {needs}")]
     Pointless { setting: &'static str, needs: &'static str },
     #[error(

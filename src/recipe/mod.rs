@@ -26,7 +26,7 @@ use crate::affine::Affine;
 use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::model::Model;
-use crate::program::{self, Program, feasibility};
+use crate::program::{self, Program, Proposal, feasibility};
 use crate::quantity::{ArrayFormat, Quantity, ValueRange};
 use crate::random::real::Real;
 use crate::random::stream::Stream;
@@ -45,6 +45,8 @@ pub struct Recipe {
     acceptance: f64,
     /// The size of the cover that candidates are proposed from; `None` of plain rejection.
     cover: Option<CoverSize>,
+    /// Number of the model's centres that have no share of the draws.
+    left_out: usize,
 }
 
 /// Size of a cover: of the boxes that candidates come from where plain rejection finds next to none.
@@ -202,6 +204,19 @@ impl Recipe {
         self.cover
     }
 
+    /// Number of measured spectra, or of a mixture's components, that have no share of the draws: about which fewer than 1
+    /// in 64 spectra would be accepted. 0 of Gaussian models.
+    pub fn left_out(&self) -> usize {
+        self.left_out
+    }
+
+    /// The error of targets of each draw's own that bound its spectrum, where the model is not a Gaussian.
+    pub(crate) fn centres_at_own_targets(&self) -> Option<RecipeError> {
+        let name = self.model.distribution().name();
+        let has_centres = matches!(self.program.proposal, Some(Proposal::Centres(_)));
+        has_centres.then_some(RecipeError::CentresAnd { name, other: builder::OWN_TARGETS })
+    }
+
     /// Range of values that its spectra may take.
     pub fn value_range(&self) -> ValueRange {
         self.program.value_range()
@@ -293,6 +308,11 @@ impl Recipe {
     /// storage buffer that [`TableStorage::Buffer`](crate::TableStorage::Buffer) declares. Empty where it reads none.
     pub fn tables(&self) -> Vec<u8> {
         wgsl::table_words(&self.program).into_iter().flat_map(u32::to_le_bytes).collect()
+    }
+
+    /// Whether its module keeps these tables in a constant unless [`ModuleOptions`] say otherwise.
+    pub fn keeps_tables_constant(&self) -> bool {
+        wgsl::keeps_tables_constant(&self.program)
     }
 
     /// Writes the compute shader that makes the draws, with its bindings and the bytes that go into them, for hosts on any

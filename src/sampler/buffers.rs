@@ -90,7 +90,7 @@ impl Sampler {
         let bound = |role| match role {
             BindingRole::Parameters => whole(&parameters),
             BindingRole::Tables => whole(self.tables.as_ref().expect("the shader has tables")),
-            BindingRole::Cover => whole(self.cover.as_ref().expect("the shader has a cover")),
+            BindingRole::Proposal => whole(self.proposal.as_ref().expect("the shader has a proposal")),
             BindingRole::Progress => {
                 whole(progress.insert(buffer(role, "spectroll progress", storage | copied)))
             }

@@ -54,8 +54,8 @@ pub struct Sampler {
     shader: Arc<ComputeShader>,
     /// The tables that the shader reads from a buffer, if it has any.
     tables: Option<wgpu::Buffer>,
-    /// The boxes from which candidates are drawn, if the recipe has a cover.
-    cover: Option<wgpu::Buffer>,
+    /// The boxes or centres that candidates are made of, if the recipe has any.
+    proposal: Option<wgpu::Buffer>,
 }
 
 /// Settings of a sampler.
@@ -146,8 +146,8 @@ impl Sampler {
             bytes.map(|bytes| filled(device, label, BufferUsages::STORAGE, bytes)).transpose()
         };
         let tables = storage("spectroll tables", BindingRole::Tables)?;
-        let cover = storage("spectroll cover", BindingRole::Cover)?;
-        Ok(Sampler { pipeline, layout, shader: Arc::new(shader), tables, cover })
+        let proposal = storage("spectroll proposal", BindingRole::Proposal)?;
+        Ok(Sampler { pipeline, layout, shader: Arc::new(shader), tables, proposal })
     }
 
     /// The capabilities of a device that a shader makes use of.
@@ -260,7 +260,7 @@ fn layout_entry(binding: &Binding) -> wgpu::BindGroupLayoutEntry {
         ty: wgpu::BindingType::Buffer {
             ty: match binding.role {
                 BindingRole::Parameters => wgpu::BufferBindingType::Uniform,
-                BindingRole::Tables | BindingRole::Cover => storage(true),
+                BindingRole::Tables | BindingRole::Proposal => storage(true),
                 BindingRole::Indices | BindingRole::Given => storage(true),
                 BindingRole::Progress | BindingRole::Output(_) => storage(false),
             },

@@ -77,6 +77,10 @@ impl TargetPlan {
                     LrvLevels::Uniform(..) => builder.clone().proposal(ProposalKind::Plain),
                 };
                 let recipe = built(largest.lrv(levels.largest()).build())?;
+                let is_own = matches!(levels, LrvLevels::Uniform(..)) && recipe.program().tests_scaled();
+                if is_own && let Some(error) = recipe.centres_at_own_targets() {
+                    return Err(because_of(&targets.aim, error));
+                }
                 let kernel = Kernel::new(recipe.program());
                 let at = |lrv: f64| {
                     if recipe.program().proposal.is_some() {

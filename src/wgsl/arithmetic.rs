@@ -18,7 +18,8 @@ use super::tables::Tables;
 use super::writer::{Text, float, list};
 use super::{Arithmetic, Form, Part};
 use crate::affine::Affine;
-use crate::program::{IntensityLaw, LrvLaw, LrvTarget, Program, Source, Unit};
+use crate::mixture::Mixture;
+use crate::program::{IntensityLaw, LrvLaw, LrvTarget, Program, Proposal, Source, Unit};
 use crate::random::real::DrawOperations;
 use crate::random::stream;
 
@@ -96,9 +97,14 @@ fn unrolled(program: &Program, form: Arithmetic) -> Text {
     let mut text = Text::default();
     text.line(&format!("alias Normals = array<f32, {k}>;"));
     given(&mut text, program.given);
-    match &program.proposal {
-        Some(proposal) => text.line(&proposal.rounded::<f32>().text(k)),
-        None => normals(&mut text, program.given, program.normals()),
+    match program.proposal.as_ref().map(Proposal::rounded) {
+        Some(Proposal::Boxes(boxes)) => text.line(&boxes.text(k)),
+        Some(Proposal::Centres(mixture)) => {
+            text.line("");
+            text.0 += &mixture.chooser();
+            normals(&mut text, 0, k, Some(&mixture));
+        }
+        None => normals(&mut text, program.given, program.normals(), None),
     }
     text.line("");
     forms(&mut text, "band", &program.spectrum);
@@ -133,23 +139,32 @@ fn given(text: &mut Text, given: usize) {
     }
 }
 
-/// Writes the function that makes normals, which follow the responses that are given.
-fn normals(text: &mut Text, given: usize, k: usize) {
+/// Writes the function that makes normals, which follow the responses that are given, or candidates of a mixture.
+fn normals(text: &mut Text, given: usize, k: usize, mixture: Option<&Mixture<f32>>) {
     let parameter = if given > 0 { ", given: Given" } else { "" };
     text.block(
         &format!(
             "fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32{parameter}) -> Normals"
         ),
         |body| {
-            for block in 0..k.div_ceil(4) {
+            let word = |w: usize| format!("w{}.{}", w / 4, ["x", "y", "z", "w"][w % 4]);
+            let words = mixture.map_or(k, |mixture| mixture.choice() + 1);
+            for block in 0..words.div_ceil(4) {
                 body.line(&format!("let w{block} = philox(vec4(index, attempt, stream | {block}u), key);"));
             }
             for pair in 0..k.div_ceil(2) {
-                let [x, y] = if pair % 2 == 0 { ["x", "y"] } else { ["z", "w"] };
-                body.line(&format!("let p{pair} = normal_pair(w{0}.{x}, w{0}.{y});", pair / 2));
+                let [x, y] = [word(2 * pair), word(2 * pair + 1)];
+                body.line(&format!("let p{pair} = normal_pair({x}, {y});"));
             }
             let normal = |j: usize| format!("p{}.{}", j / 2, if j.is_multiple_of(2) { "x" } else { "y" });
-            let input = |i: usize| if i < given { format!("given[{i}]") } else { normal(i - given) };
+            if let Some(mixture) = mixture {
+                body.line(&mixture.read(&word(mixture.choice())));
+            }
+            let input = |i: usize| match mixture {
+                Some(mixture) => mixture.coordinate(i, normal),
+                None if i < given => format!("given[{i}]"),
+                None => normal(i - given),
+            };
             body.line(&format!("return Normals({});", list(given + k, input)));
         },
     );
@@ -229,8 +244,12 @@ fn looped(program: &Program, tables: &Tables) -> Text {
         text.line(&format!("    {line}"));
     });
     text.line("    return s;\n}\n");
-    match &program.proposal {
-        Some(proposal) => text.0 += &proposal.rounded::<f32>().text(4 * k.div_ceil(4)),
+    match program.proposal.as_ref().map(Proposal::rounded) {
+        Some(Proposal::Boxes(boxes)) => text.0 += &boxes.text(4 * k.div_ceil(4)),
+        Some(Proposal::Centres(mixture)) => {
+            text.0 += &mixture.looped();
+            text.0 += &NORMALS.replace("    return z;\n", &(mixture.call() + "    return z;\n"));
+        }
         None => text.0 += &after_given(NORMALS, first),
     }
     if program.target.is_some() {

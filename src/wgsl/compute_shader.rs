@@ -4,10 +4,10 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{
-    Arithmetic, COVER_AT, Dialect, GIVEN_AT, INDICES_AT, Indexing, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT,
+    Arithmetic, Dialect, GIVEN_AT, INDICES_AT, Indexing, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT, PROPOSAL_AT,
     TABLES_AT, WORKGROUP, WgslError, attempts_per_dispatch, draws_per_thread, is_sliced, shader_of,
 };
-use crate::program::Program;
+use crate::program::{Program, Proposal};
 use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::{DrawRange, Draws};
 
@@ -33,8 +33,9 @@ pub enum BindingRole {
     Parameters,
     /// Numbers of the model, in a storage buffer that is read: [`ComputeShader::contents`].
     Tables,
-    /// Boxes from which candidates are proposed, in a storage buffer that is read: [`ComputeShader::contents`].
-    Cover,
+    /// Boxes of a cover or centres of a model, about which candidates are made, in a storage buffer that is read:
+    /// [`ComputeShader::contents`].
+    Proposal,
     /// A word of progress for each draw, in a storage buffer that is read and written: zeros before the first dispatch.
     Progress,
     /// Indices of the draws, two words each, low and high, in a storage buffer that is read.
@@ -64,9 +65,9 @@ pub struct Binding {
 pub struct ComputeShader {
     text: String,
     bindings: Vec<Binding>,
-    /// Bytes of the tables, and of the boxes.
+    /// Bytes of the tables, and of the boxes or centres.
     tables: Vec<u8>,
-    cover: Vec<u8>,
+    proposal: Vec<u8>,
     formats: Vec<ArrayFormat>,
     variant: ShaderVariant,
     max_attempts: u32,
@@ -120,7 +121,7 @@ impl ComputeShader {
         let others = [
             (PARAMETERS_AT, BindingRole::Parameters, true),
             (TABLES_AT, BindingRole::Tables, !tables.is_empty()),
-            (COVER_AT, BindingRole::Cover, program.proposal.is_some()),
+            (PROPOSAL_AT, BindingRole::Proposal, program.proposal.is_some()),
             (PROGRESS_AT, BindingRole::Progress, is_sliced(program, variant.dialect)),
             (INDICES_AT, BindingRole::Indices, variant.indexing == Indexing::List),
             (GIVEN_AT, BindingRole::Given, program.given > 0),
@@ -132,12 +133,12 @@ impl ComputeShader {
             role: BindingRole::Output(quantity),
         });
         let bindings = others.map(|(binding, role, _)| Binding { binding, role }).chain(outputs).collect();
-        let cover = program.proposal.iter().flat_map(|proposal| proposal.rounded::<f32>().words());
+        let proposal = program.proposal.iter().flat_map(Proposal::words);
         Ok(ComputeShader {
             text,
             bindings,
             tables: bytemuck::cast_slice(tables).to_vec(),
-            cover: cover.flat_map(bytemuck::cast::<_, [u8; 16]>).collect(),
+            proposal: proposal.flat_map(bytemuck::cast::<_, [u8; 16]>).collect(),
             formats,
             variant,
             max_attempts: program.max_attempts,
@@ -173,7 +174,7 @@ impl ComputeShader {
         match role {
             BindingRole::Parameters => size_of::<Parameters>() as u64,
             BindingRole::Tables => self.tables.len() as u64,
-            BindingRole::Cover => self.cover.len() as u64,
+            BindingRole::Proposal => self.proposal.len() as u64,
             BindingRole::Progress => 4 * capacity,
             BindingRole::Indices => INDEX_BYTES * capacity,
             BindingRole::Given => size_of::<f32>() as u64 * self.given as u64 * capacity,
@@ -188,7 +189,7 @@ impl ComputeShader {
     pub fn contents(&self, role: BindingRole) -> Option<&[u8]> {
         match role {
             BindingRole::Tables => Some(&self.tables),
-            BindingRole::Cover => Some(&self.cover),
+            BindingRole::Proposal => Some(&self.proposal),
             _ => None,
         }
     }

@@ -1,5 +1,6 @@
 //! A cover's candidates as WGSL text.
 
+use super::proposal::choice;
 use crate::cover::BoxMixture;
 
 const TRUNCATED: &str = include_str!("../../shaders/truncated.wgsl");
@@ -7,7 +8,7 @@ const COVER: &str = include_str!("../../shaders/cover.wgsl");
 
 impl BoxMixture<f32> {
     /// `candidate(key, index, stream, attempt) -> Candidate`: the coordinates, as `Normals` that are made of as many
-    /// floats as `padded`, and whether thinning keeps them. Reads [`words`](Self::words), of which `box_row(i)` gives four.
+    /// floats as `padded`, and whether thinning keeps them. Reads [`words`](Self::words), of which `proposal_row(i)` gives four.
     /// Needs the fragments that make random words and normals.
     pub(crate) fn text(&self, padded: usize) -> String {
         let k = self.components;
@@ -16,13 +17,11 @@ impl BoxMixture<f32> {
             .map(|b| format!("    let w{b} = philox(vec4(index, attempt, stream | {b}u), key);\n"));
         let coordinates = (0..k).map(|j| format!("    let c{j} = coordinate(row, {j}u, {});\n", word(j + 1)));
         let normals = (0..padded).map(|j| if j < k { format!("c{j}.x") } else { "0f".to_owned() });
-        let first = "bitcast<f32>(box_row(row).z)".to_owned();
+        let first = "bitcast<f32>(proposal_row(row).z)".to_owned();
         let cost = (0..k).fold(first, |sum, j| format!("rounded({sum} + c{j}.y)"));
         format!(
             "{TRUNCATED}
-const BITS = {}u;
-const ROWS = {}u;
-
+{}
 {COVER}
 struct Candidate {{ z: Normals, kept: bool }}
 
@@ -32,8 +31,7 @@ fn candidate(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32) -> Can
     return Candidate(Normals({}), cost < chi_square({}));
 }}
 ",
-            self.alias.bits,
-            k + 1,
+            choice(&self.alias, k + 1, "let row = proposal_row(c * ROWS);\n    return vec2(row.x, row.y);"),
             blocks.collect::<String>(),
             word(0),
             coordinates.collect::<String>(),
@@ -51,8 +49,8 @@ mod tests {
     use crate::cover::tests::near_white;
     use crate::wgsl::{Arithmetic, Dialect, generator};
 
-    const BOX_ROW: &str = "@group(0) @binding(4) var<storage, read> cover: array<vec4<u32>>;
-        fn box_row(i: u32) -> vec4<u32> { return cover[i]; }";
+    const PROPOSAL_ROW: &str = "@group(0) @binding(4) var<storage, read> cover: array<vec4<u32>>;
+        fn proposal_row(i: u32) -> vec4<u32> { return cover[i]; }";
 
     #[test]
     fn the_text_is_valid_without_any_capability() {
@@ -63,7 +61,7 @@ mod tests {
         ];
         for (padded, normals) in normals {
             let candidates = written(&proposal.text(padded), Arithmetic::Plain, Zero::Parameter);
-            let text = [normals, &generator(Dialect::Baseline), &candidates, BOX_ROW].join("\n");
+            let text = [normals, &generator(Dialect::Baseline), &candidates, PROPOSAL_ROW].join("\n");
             let module = naga::front::wgsl::parse_str(&text).map_err(|e| e.emit_to_string(&text)).unwrap();
             let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
             validator.validate(&module).map_err(|e| e.emit_to_string(&text)).unwrap();

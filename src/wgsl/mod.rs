@@ -15,12 +15,14 @@ mod cover;
 mod guards;
 #[cfg(test)]
 pub(crate) mod layout;
+mod mixture;
 mod module;
 // Only measurements leave parts out.
 #[cfg_attr(not(feature = "report"), allow(dead_code, unreachable_pub))]
 mod part;
 #[cfg(test)]
 mod probe;
+mod proposal;
 mod self_test;
 mod shader;
 mod store;
@@ -29,7 +31,7 @@ mod writer;
 
 pub use compute_shader::{Binding, BindingRole, ComputeShader, ShaderVariant};
 pub use module::{ModuleOptions, TableStorage, WgslError};
-pub(crate) use module::{module, table_words};
+pub(crate) use module::{keeps_tables_constant, module, table_words};
 #[cfg_attr(not(feature = "report"), allow(unreachable_pub))]
 pub use part::Part;
 pub use self_test::ArithmeticTrait;
@@ -59,11 +61,11 @@ pub(crate) const TABLES_AT: u32 = 1;
 /// The binding of the first quantity; that of another is its number more.
 pub(crate) const OUTPUTS_AT: u32 = 2;
 
-/// The binding of a cover's boxes.
-pub(crate) const COVER_AT: u32 = OUTPUTS_AT + Quantity::COUNT as u32;
+/// The binding of a cover's boxes or a model's centres.
+pub(crate) const PROPOSAL_AT: u32 = OUTPUTS_AT + Quantity::COUNT as u32;
 
 /// The binding of the progress of draws that one dispatch may not end.
-pub(crate) const PROGRESS_AT: u32 = COVER_AT + 1;
+pub(crate) const PROGRESS_AT: u32 = PROPOSAL_AT + 1;
 
 /// The binding of the indices of draws, where these are given in a list.
 pub(crate) const INDICES_AT: u32 = PROGRESS_AT + 1;
@@ -160,7 +162,8 @@ mod tests {
     use crate::affine::Affine;
     use crate::dataset::SpectrumKind;
     use crate::grid::Grid;
-    use crate::program::{self, Bounds, IntensityLaw, LrvLaw, Source, Unit};
+    use crate::mixture::{Centres, Mixture, Spread, triangle};
+    use crate::program::{self, Bounds, IntensityLaw, LrvLaw, Proposal, Source, Unit};
     use crate::quantity::{ArrayFormat, Layout};
 
     /// A program of 3 bands and 2 components, small enough to read.
@@ -194,6 +197,13 @@ mod tests {
             given: 0,
         }
         .with_status()
+    }
+
+    /// Two centres.
+    fn mixture(components: usize, spread: Spread) -> Mixture<f64> {
+        let coordinates = (0..2 * components).map(|i| 0.25 * i as f64).collect();
+        let centres = Centres { coordinates, spread, shares: vec![1.0, 3.0], components };
+        centres.within(&[]).expect("nothing is rejected").0
     }
 
     /// The program with all that can come out of it, so laid.
@@ -277,6 +287,13 @@ mod tests {
             }
             let targets = laws.into_iter().flat_map(|law| rules.map(|bounds| Some((law, bounds))));
             programs.extend([None].into_iter().chain(targets).map(|t| of(SpectrumKind::Reflectance, t)));
+            for spread in [Spread::Same(0.3), Spread::Own(vec![0.25; 2 * triangle(components)])] {
+                let proposal = Some(Proposal::Centres(mixture(components, spread)));
+                let plain = of(SpectrumKind::Reflectance, None);
+                programs.push(Program { proposal: proposal.clone(), ..plain });
+                let scaled = of(SpectrumKind::Reflectance, Some((LrvLaw::Fixed(0.4), Bounds::Scaled)));
+                programs.push(Program { proposal, ..scaled });
+            }
             if components > 1 {
                 programs.push(Program { given: components / 2, ..of(SpectrumKind::Reflectance, None) });
             }
@@ -357,6 +374,8 @@ mod tests {
         let level = IntensityLaw::LogUniform { low: 0.15, octaves: 10.0 };
         let lamp = || Program { intensity: Some(level.clone()), ..light() };
         let lamps = || Program { intensity: Some(IntensityLaw::OneOf(vec![1.0, 2.0])), ..light() };
+        let about =
+            |spread, program| Program { proposal: Some(Proposal::Centres(mixture(2, spread))), ..program };
         let generated = |program: &Program, target| {
             let tables = Tables::new(program);
             let text = arithmetic(program, &tables, Arithmetic::Plain, None)
@@ -378,6 +397,12 @@ mod tests {
                 "reflectance_in_halves",
                 with_all(surface(None), Layout::PaddedRows, Dtype::F16),
                 Dialect::Int64,
+            ),
+            ("kernel", about(Spread::Same(0.3), only(surface(None), Quantity::Weights)), Dialect::Baseline),
+            (
+                "mixture",
+                about(Spread::Own(vec![0.25; 6]), only(surface(None), Quantity::Weights)),
+                Dialect::Baseline,
             ),
             ("weights", only(surface(None), Quantity::Weights), Dialect::Baseline),
             ("xyz", only(surface(None), Quantity::Xyz), Dialect::Baseline),

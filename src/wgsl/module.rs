@@ -10,7 +10,7 @@ use super::writer::{Text, float, list};
 use super::{Arithmetic, Dialect, Form};
 use crate::dataset::SpectrumKind;
 use crate::grid::Grid;
-use crate::program::{Program, Source, Unit};
+use crate::program::{Program, Proposal, Source, Unit};
 use crate::quantity::Quantity;
 use crate::random::real::DrawOperations;
 
@@ -28,6 +28,10 @@ pub enum WgslError {
     TooManyBands(usize),
     #[error("a table of {words} words, and constants hold {MOST_CONSTANTS} at most: keep it in a buffer")]
     LargeTable { words: usize },
+    #[error(
+        "the centres of a distribution are read number by number, and compilers copy a constant for each: keep them in a buffer"
+    )]
+    ConstantCentres,
 }
 
 /// Place of the tables that a module reads, where a recipe needs some.
@@ -49,21 +53,26 @@ pub enum TableStorage {
 pub struct ModuleOptions {
     /// Form of the arithmetic. In the exact form the functions that draw take one argument more, a `zero`.
     pub arithmetic: Arithmetic,
-    /// Place of the tables; where it is `None`, a constant of up to 2,047 words, and beyond that a buffer at group 0 and
-    /// binding 0.
+    /// Place of the tables; where it is `None`, a constant of up to 2,047 words, and beyond that, or of a
+    /// [`Distribution`](crate::Distribution) that is not a Gaussian, a buffer at group 0 and binding 0.
     pub tables: Option<TableStorage>,
 }
 
-impl ModuleOptions {
-    /// The most bytes of a table that a constant holds.
-    pub const MOST_CONSTANT_BYTES: usize = 4 * MOST_CONSTANTS;
-}
-
-/// Words of the tables that a program's module reads, numbers and then boxes; none of most programs.
+/// Words of the tables that a program's module reads, numbers and then boxes or centres; none of most programs.
 pub(crate) fn table_words(program: &Program) -> Vec<u32> {
     let numbers = Tables::new(program).values.into_iter().map(f32::to_bits);
-    let boxes = program.proposal.iter().flat_map(|proposal| proposal.rounded::<f32>().words());
-    numbers.chain(boxes.flatten()).collect()
+    let rows = program.proposal.iter().flat_map(Proposal::words);
+    numbers.chain(rows.flatten()).collect()
+}
+
+/// Whether a module keeps a program's tables in a constant unless it is told otherwise. Those of centres are read number by
+/// number, and a compiler copies all of a constant for each.
+pub(crate) fn keeps_tables_constant(program: &Program) -> bool {
+    !has_centres(program) && table_words(program).len() <= MOST_CONSTANTS
+}
+
+fn has_centres(program: &Program) -> bool {
+    matches!(program.proposal, Some(Proposal::Centres(_)))
 }
 
 /// The module of a program on a grid.
@@ -107,10 +116,11 @@ fn storage(program: &Program, numbers: usize, storage: Option<TableStorage>) -> 
     if words.is_empty() {
         return Ok(String::new());
     }
-    let fits = words.len() <= MOST_CONSTANTS;
+    let fits = keeps_tables_constant(program);
     let default = || if fits { TableStorage::Const } else { TableStorage::Buffer { group: 0, binding: 0 } };
     let mut text = Text::default();
     let name = match storage.unwrap_or_else(default) {
+        TableStorage::Const if has_centres(program) => return Err(WgslError::ConstantCentres),
         TableStorage::Const if !fits => return Err(WgslError::LargeTable { words: words.len() }),
         TableStorage::Const => {
             let count = words.len();
@@ -130,8 +140,13 @@ fn storage(program: &Program, numbers: usize, storage: Option<TableStorage>) -> 
             body.line(&format!("return bitcast<f32>({name}[i]);"));
         });
     }
+    if has_centres(program) {
+        text.block("fn proposal_word(i: u32) -> u32", |body| {
+            body.line(&format!("return {name}[{numbers}u + i];"));
+        });
+    }
     if program.proposal.is_some() {
-        text.block("fn box_row(i: u32) -> vec4<u32>", |body| {
+        text.block("fn proposal_row(i: u32) -> vec4<u32>", |body| {
             body.line(&format!("let at = {numbers}u + 4u * i;"));
             body.line(&format!(
                 "return vec4({name}[at], {name}[at + 1u], {name}[at + 2u], {name}[at + 3u]);"

@@ -141,7 +141,7 @@ fn truncated_normals_are_those_of_their_twin() {
 
 const BOX_ROW: &str = "
 @group(0) @binding(2) var<storage, read> cover: array<vec4<u32>>;
-fn box_row(i: u32) -> vec4<u32> { return cover[i]; }";
+fn proposal_row(i: u32) -> vec4<u32> { return cover[i]; }";
 
 /// Whole candidates: every coordinate, and whether thinning keeps them.
 #[test]

@@ -5,10 +5,10 @@ use super::guards::{Zero, written};
 use super::store::store;
 use super::writer::list;
 use super::{
-    Arithmetic, COVER_AT, Dialect, Form, GIVEN_AT, INDICES_AT, Indexing, PROGRESS_AT, Part, ShaderVariant,
+    Arithmetic, Dialect, Form, GIVEN_AT, INDICES_AT, Indexing, PROGRESS_AT, PROPOSAL_AT, Part, ShaderVariant,
     TABLES_AT, Tables, WORKGROUP, draws_per_thread, part,
 };
-use crate::program::{IntensityLaw, Program};
+use crate::program::{IntensityLaw, Program, Proposal};
 use crate::quantity::Dtype;
 
 /// The most iterations that the loops of an invocation make in one dispatch, nested ones counted: llvmpipe ends them
@@ -45,7 +45,11 @@ pub(crate) fn attempts_per_dispatch(program: &Program, target: Dialect) -> u32 {
             let candidate = (1 + has_target) * program.bands() * value;
             // Halves are stored in a loop of two within another.
             let stores = (2 + value) * strides + 2 * has_target * program.bands() * value;
-            (stores, 1 + candidate + program.normals().div_ceil(4))
+            let placed = match &program.proposal {
+                Some(Proposal::Centres(mixture)) => mixture.rounded::<f32>().iterations(),
+                _ => 0,
+            };
+            (stores, 1 + candidate + program.normals().div_ceil(4) + placed)
         }
     };
     let draws = u64::from(draws_per_thread(program, target));
@@ -59,7 +63,7 @@ pub(crate) fn is_sliced(program: &Program, target: Dialect) -> bool {
 }
 
 /// Keeps of a fragment the lines that have no condition, and those whose condition holds.
-fn kept(fragment: &str, holds: impl Fn(&str) -> bool) -> String {
+pub(super) fn kept(fragment: &str, holds: impl Fn(&str) -> bool) -> String {
     let line = |line: &str| match line.rsplit_once(" // if ") {
         Some((line, word)) => holds(word).then(|| line.to_owned() + "\n"),
         None => Some(line.to_owned() + "\n"),
@@ -132,8 +136,12 @@ pub(crate) fn shader_without(
         parts.push(table + "fn number(i: u32) -> f32 { return tables[i]; }\n");
     }
     if program.proposal.is_some() {
-        let cover = format!("@group(0) @binding({COVER_AT}) var<storage, read> cover: array<vec4<u32>>;\n\n");
-        parts.push(cover + "fn box_row(i: u32) -> vec4<u32> { return cover[i]; }\n");
+        let rows =
+            format!("@group(0) @binding({PROPOSAL_AT}) var<storage, read> proposal: array<vec4<u32>>;\n\n");
+        parts.push(rows + "fn proposal_row(i: u32) -> vec4<u32> { return proposal[i]; }\n");
+        if let Some(Proposal::Centres(_)) = program.proposal {
+            parts.push("fn proposal_word(i: u32) -> u32 { return proposal[i / 4u][i % 4u]; }\n".to_owned());
+        }
     }
     let elements = || program.outputs.iter().map(|output| output.format.dtype);
     if elements().any(|element| element == Dtype::F16) {
@@ -163,8 +171,8 @@ pub(super) fn functions(
         "whole" => !sliced,
         "scaled" => program.scales(),
         "own_targets" => program.has_own_targets(),
-        "covered" => program.proposal.is_some(),
-        "plain" => program.proposal.is_none(),
+        "covered" => program.is_covered(),
+        "plain" => !program.is_covered(),
         "carries_zero" => carries_zero,
         other => unreachable!("draw.wgsl has a line for programs that are {other:?}"),
     };

@@ -295,10 +295,16 @@ fn small_recipes() -> Vec<(&'static str, Recipe)> {
             .expect("it can be drawn")
     };
     let cover = surface.clone().covariance_scale(25.0).proposal(ProposalKind::Cover);
+    let kernel = |grid: &str, components| {
+        let model = Model::builtin_with("munsell-vrhel-kernel", grid.parse().expect("a grid"), components);
+        Recipe::builder(&model.expect("its data have these wavelengths"))
+    };
     vec![
         ("lrv each", of(surface.clone().lrv(0.2..0.6).bounds(Bounds::Both))),
         ("lrv base", of(surface.lrv(0.6).spectra_dtype(Dtype::F16))),
         ("cover", of(cover)),
+        ("kernel", of(kernel("400:50:700", 6))),
+        ("looped kernel", of(kernel("400:1:700", 8))),
         ("log-uniform", of(light.intensity(Intensity::LogUniform(0.15, 150.0)))),
         ("looped lrv each", of(fine_surfaces().lrv(0.2..0.6).bounds(Bounds::Both))),
     ]

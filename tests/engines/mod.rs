@@ -5,7 +5,10 @@
 
 use std::sync::OnceLock;
 
-use spectroll::{ArithmeticChoice, Engine, EngineChoice, Model, Recipe, RecipeBuilder};
+use spectroll::{
+    ArithmeticChoice, BuiltinTable, Dataset, Engine, EngineChoice, Extrapolation, Fit, FitDistribution, Grid,
+    Model, Recipe, RecipeBuilder, SpectrumKind,
+};
 
 /// The best adapter, or the one that `WGPU_ADAPTER_NAME` picks; without one, tests fail.
 pub(crate) fn gpu() -> &'static Engine {
@@ -43,4 +46,30 @@ pub(crate) fn surfaces() -> RecipeBuilder {
 
 pub(crate) fn lights() -> RecipeBuilder {
     Recipe::builder(&Model::builtin("granada").expect("it is built in"))
+}
+
+/// Surfaces about each of those that were measured.
+pub(crate) fn kernel_surfaces() -> RecipeBuilder {
+    Recipe::builder(&Model::builtin("munsell-vrhel-kernel").expect("it is built in"))
+}
+
+/// The same at other wavelengths, of as many components.
+pub(crate) fn kernel_at(grid: &str, components: usize) -> RecipeBuilder {
+    let grid: Grid = grid.parse().expect("a grid");
+    let model = Model::builtin_with("munsell-vrhel-kernel", grid, components);
+    Recipe::builder(&model.expect("its data have these wavelengths"))
+}
+
+/// Lamps from four normal distributions.
+pub(crate) fn lamps() -> RecipeBuilder {
+    lamps_at("400:10:700", 6)
+}
+
+/// The same at other wavelengths, of as many components.
+pub(crate) fn lamps_at(grid: &str, components: usize) -> RecipeBuilder {
+    let grid: Grid = grid.parse().expect("a grid");
+    let data = Dataset::new(&[BuiltinTable::Houser.table()], grid, Extrapolation::Error);
+    let fit = Fit::new(SpectrumKind::Illuminant).components(components);
+    let fit = fit.distribution(FitDistribution::Mixture(4));
+    Recipe::builder(&fit.fit(&data.expect("they have these wavelengths")).expect("lamps can be fitted"))
 }

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use spectroll::evaluation::statistics::{Scenario, ScenarioDraw};
-use spectroll::{Bounds, Real, SpectrumKind, Stream, colorimetry, philox};
+use spectroll::{Bounds, Distribution, Real, SpectrumKind, Stream, colorimetry, philox};
 
 /// What is wrong with a sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +44,16 @@ pub(crate) enum Fault {
     IndexHighIgnored,
     /// The number of the stream is left out.
     StreamIgnored,
+    /// Centres are chosen by their acceptance and not by its reciprocal.
+    OddsNotInverted,
+    /// Centres are not drawn towards the mean.
+    ShrinkageMissing,
+    /// The bandwidth is squared.
+    BandwidthSquared,
+    /// A further attempt has the centre of the first.
+    CentreReused,
+    /// What is chosen beside a column of the table is the next but one.
+    AliasShifted,
 }
 
 pub(crate) struct Pipeline<'a> {
@@ -53,6 +63,80 @@ pub(crate) struct Pipeline<'a> {
     /// A column for each normal.
     gain: DMatrix<f64>,
     lrv_weights: Vec<f64>,
+    centres: Option<Centres>,
+}
+
+/// The normal distributions of a kernel, in the frame of the standard normals.
+struct Centres {
+    coordinates: Vec<DVector<f64>>,
+    bandwidth: f64,
+    /// Threshold and alias of each column of the table.
+    columns: Vec<[u32; 2]>,
+    /// The sums of odds that are not inverted, from 0 to 1.
+    wrong: Vec<f64>,
+}
+
+impl Centres {
+    fn new(scenario: &Scenario, fault: Option<Fault>) -> Option<Centres> {
+        let Distribution::Kernel { bandwidth, weights } = scenario.model.distribution() else { return None };
+        let parts = scenario.model.parts();
+        let k = weights.ncols();
+        let shrinkage = match fault {
+            Some(Fault::ShrinkageMissing) => 1.0,
+            _ => (1.0 - bandwidth * bandwidth).sqrt(),
+        };
+        // The covariance is diagonal, as that of every fit.
+        let coordinate = |i: usize, j: usize| {
+            shrinkage * (weights[(i, j)] - parts.weight_mean[j]) / parts.weight_covariance[(j, j)].sqrt()
+        };
+        let bytes = scenario.recipe().tables();
+        let words: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+        // After the centres: a word for each column, the alias in its lowest bits.
+        let count = weights.nrows().next_power_of_two();
+        let columns: Vec<[u32; 2]> = words[weights.nrows() * k.next_multiple_of(4)..][..count]
+            .iter()
+            .map(|word| [word & !(count as u32 - 1), word & (count as u32 - 1)])
+            .collect();
+        let mut odds = vec![0.0; weights.nrows()];
+        for (column, &[threshold, alias]) in columns.iter().enumerate() {
+            let share = f64::from(threshold) / 2f64.powi(32);
+            if share > 0.0 {
+                odds[column] += share;
+            }
+            odds[alias as usize] += 1.0 - share;
+        }
+        let wrong: Vec<f64> = odds
+            .iter()
+            .scan(0.0, |sum, odds| {
+                *sum += odds.recip();
+                Some(*sum)
+            })
+            .collect();
+        let total = *wrong.last()?;
+        Some(Centres {
+            coordinates: (0..weights.nrows()).map(|i| DVector::from_fn(k, |j, _| coordinate(i, j))).collect(),
+            bandwidth: if fault == Some(Fault::BandwidthSquared) {
+                bandwidth * bandwidth
+            } else {
+                *bandwidth
+            },
+            columns,
+            wrong: wrong.into_iter().map(|sum| sum / total).collect(),
+        })
+    }
+
+    fn choose(&self, word: u32, fault: Option<Fault>) -> &DVector<f64> {
+        if fault == Some(Fault::OddsNotInverted) {
+            let share = (f64::from(word) + 0.5) / 2f64.powi(32);
+            return &self.coordinates[self.wrong.partition_point(|sum| *sum < share)];
+        }
+        let bits = self.columns.len().trailing_zeros();
+        let column = word >> (32 - bits);
+        let [threshold, alias] = self.columns[column as usize];
+        let alias = alias as usize + usize::from(fault == Some(Fault::AliasShifted));
+        let chosen = if word << bits < threshold { column as usize } else { alias };
+        &self.coordinates[chosen % self.coordinates.len()]
+    }
 }
 
 impl<'a> Pipeline<'a> {
@@ -81,6 +165,7 @@ impl<'a> Pipeline<'a> {
         Pipeline {
             scenario,
             fault,
+            centres: Centres::new(scenario, fault),
             offset: &parts.mean + basis.tr_mul(&weight_mean),
             gain: basis.tr_mul(&factor) * scenario.scale.sqrt(),
             lrv_weights: match fault {
@@ -135,7 +220,14 @@ impl<'a> Pipeline<'a> {
         let k = self.gain.ncols();
         let blocks = 0..k.div_ceil(4) as u32;
         let normals = blocks.flat_map(|block| self.normals(self.words(stream, index, attempt, block)));
-        let mut base = &self.offset + &self.gain * DVector::from_iterator(k, normals.take(k));
+        let mut z = DVector::from_iterator(k, normals.take(k));
+        if let Some(centres) = &self.centres {
+            let attempt = if self.has(Fault::CentreReused) { 0 } else { attempt };
+            let word = k.next_multiple_of(2);
+            let word = self.words(stream, index, attempt, word as u32 / 4)[word % 4];
+            z = centres.choose(word, self.fault) + centres.bandwidth * z;
+        }
+        let mut base = &self.offset + &self.gain * z;
         if self.has(Fault::BandShifted) {
             base.as_mut_slice().rotate_right(1);
         }

@@ -107,6 +107,14 @@ impl Compared {
             let _ =
                 write!(text, "; the determinant of their covariance is {:.1} % of the data's", 100.0 * ratio);
         }
+        if let Some(p) = self.figures.chromaticity_p_value {
+            let told = if p < 0.05 {
+                "tells their chromaticities apart"
+            } else {
+                "does not tell their chromaticities apart"
+            };
+            let _ = write!(text, "; an energy test {told} (p = {p:.3})");
+        }
         text
     }
 

@@ -11,7 +11,9 @@ use std::path::PathBuf;
 use serde::Serialize;
 use spectroll::evaluation::comparison::ComparisonFigures;
 use spectroll::wording::{grouped, wrapped};
-use spectroll::{Bounds, CoverSize, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind};
+use spectroll::{
+    Bounds, CoverSize, Distribution, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind,
+};
 
 mod comparison;
 
@@ -101,10 +103,15 @@ struct Facts<'a> {
     kind: SpectrumKind,
     wavelengths_nm: Vec<f64>,
     normalization: Normalization,
+    /// gaussian, kernel or mixture.
+    distribution: &'static str,
+    /// The number of normal distributions, and of those that have no share of the draws.
+    normal_distributions: usize,
+    left_out: usize,
     sources: &'a [String],
     /// The largest luminous reflectance that scaled reflectances reach; nothing of illuminants.
     largest_lrv: Option<f64>,
-    /// The estimated share of the model's Gaussian that is accepted.
+    /// The estimated share of the model's candidates that are accepted.
     accepted_percent: Option<f64>,
     candidates_per_draw: Option<f64>,
     /// Reason for which the recipe cannot be drawn, where it cannot.
@@ -146,6 +153,9 @@ impl<'a> Facts<'a> {
             kind: model.kind(),
             wavelengths_nm: model.grid().wavelengths().collect(),
             normalization: parts.normalization,
+            distribution: model.distribution().name(),
+            normal_distributions: model.distribution().len(),
+            left_out: drawn.map_or(0, Recipe::left_out),
             sources: &parts.sources,
             largest_lrv: Recipe::largest_lrv(model),
             accepted_percent: drawn.map(|recipe| 100.0 * recipe.probability()),
@@ -178,6 +188,7 @@ fn table(
         line(&mut text, "basis", &said);
     }
     line(&mut text, "normalization", normalization(model.parts().normalization));
+    line(&mut text, "distribution", &distribution(model, recipe));
     for (index, source) in model.parts().sources.iter().enumerate() {
         line(&mut text, if index == 0 { "sources" } else { "" }, source);
     }
@@ -222,11 +233,31 @@ fn normalization(normalization: Normalization) -> &'static str {
     }
 }
 
+/// Describes the distribution of the weights, and what of it is not drawn.
+fn distribution(model: &Model, recipe: &Result<Recipe, RecipeError>) -> String {
+    let said = model.distribution().to_string();
+    match recipe.as_ref().map_or(0, Recipe::left_out) {
+        0 => said,
+        left_out => format!(
+            "{said}, of which {} {} no share: fewer than 1 draw in 64 about {} would be accepted",
+            grouped(left_out as u64),
+            if left_out == 1 { "has" } else { "have" },
+            if left_out == 1 { "it" } else { "them" },
+        ),
+    }
+}
+
 /// Describes the source of candidates, and its cost.
 fn candidates(recipe: &Recipe) -> String {
     let each = 1.0 / recipe.acceptance();
     match recipe.cover() {
-        None => format!("the model's Gaussian: {each:.2} for each draw"),
+        None => {
+            let from = match recipe.model().distribution() {
+                Distribution::Gaussian => "Gaussian",
+                _ => "normal distributions",
+            };
+            format!("the model's {from}: {each:.2} for each draw")
+        }
         Some(CoverSize { boxes, bytes, .. }) => format!(
             "{} boxes, a table of {} KB: {each:.2} for each draw, at about twice the cost of the Gaussian's, of which \
              a draw would take {:.3e}",
@@ -237,7 +268,7 @@ fn candidates(recipe: &Recipe) -> String {
     }
 }
 
-/// Share of the model's Gaussian that is accepted, and the rule.
+/// Share of the model's candidates that are accepted, and the rule.
 fn accepted(recipe: &Recipe) -> String {
     let rule = match (recipe.model().kind(), recipe.settings().lrv, recipe.settings().bounds) {
         (SpectrumKind::Illuminant, ..) => "power above 0 in every band",

@@ -7,7 +7,7 @@ mod dialect;
 use std::path::Path;
 
 use super::reading::{ReadOptions, Reading};
-use super::sheet::{self, lay_out};
+use super::sheet::lay_out;
 use super::units::WavelengthUnit;
 use super::{DatasetError, Table};
 use crate::wording::counted;
@@ -71,9 +71,10 @@ fn stated_unit(text: &str) -> Option<WavelengthUnit> {
 }
 
 /// Reads a table of cells that are no text, as spreadsheets have them.
+#[cfg(feature = "spreadsheets")]
 pub(super) fn read_sheet(
     path: &Path,
-    sheet: &sheet::Sheet,
+    sheet: &super::sheet::Sheet,
     format: &str,
     options: &ReadOptions,
 ) -> Result<Reading, DatasetError> {

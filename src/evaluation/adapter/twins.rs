@@ -7,7 +7,7 @@ use crate::colorimetry::Illuminant;
 use crate::dataset::{BuiltinTable, Dataset, SpectrumKind};
 use crate::engine::{ArithmeticChoice, Batch, Engine, EngineChoice, EngineError};
 use crate::grid::Extrapolation;
-use crate::model::{Fit, Model};
+use crate::model::{Fit, FitDistribution, Model};
 use crate::program::Bounds;
 use crate::quantity::{Dtype, Layout, Quantity};
 use crate::random::stream::Stream;
@@ -35,12 +35,15 @@ fn recipes() -> Result<Vec<(&'static str, Recipe)>, AdapterError> {
     let model = |name| Model::builtin(name).expect("it is built in");
     let surfaces = || Recipe::builder(&model("munsell-vrhel"));
     let lights = || Recipe::builder(&model("granada"));
-    let fine = {
-        let grid = "390:1:730".parse().expect("it is a grid");
+    let fitted = |grid: &str, components, distribution| {
+        let grid = grid.parse().expect("it is a grid");
         let data = Dataset::new(&[BuiltinTable::Vrhel.table()], grid, Extrapolation::Error);
-        let fit = Fit::new(SpectrumKind::Reflectance).components(40);
+        let fit = Fit::new(SpectrumKind::Reflectance).components(components).distribution(distribution);
         fit.fit(&data.expect("the table has these wavelengths")).expect("it has that rank")
     };
+    let fine = fitted("390:1:730", 40, FitDistribution::Gaussian);
+    let fine_kernel = fitted("390:1:730", 40, FitDistribution::Kernel(Some(0.3)));
+    let mixture = fitted("400:10:700", 6, FitDistribution::Mixture(3));
     let everything = Quantity::ALL.iter().copied();
     let all = everything.filter(|q| !matches!(q, Quantity::Intensity | Quantity::Responses));
     let of_lights = [Quantity::Spectra, Quantity::Xyz, Quantity::Intensity, Quantity::Attempts];
@@ -52,6 +55,8 @@ fn recipes() -> Result<Vec<(&'static str, Recipe)>, AdapterError> {
         ("LRV, both", surfaces().lrv(0.6).bounds(Bounds::Both)),
         ("an LRV for each draw", surfaces().lrv(0.2..0.6).bounds(Bounds::Both).quantities(all)),
         ("cover", surfaces().lrv(0.99).bounds(Bounds::Scaled)),
+        ("kernel", Recipe::builder(&model("munsell-vrhel-kernel"))),
+        ("mixture", Recipe::builder(&mixture)),
         ("XYZ", surfaces().xyz([0.3, 0.3, 0.3])),
         (
             "log-uniform intensity",
@@ -62,6 +67,7 @@ fn recipes() -> Result<Vec<(&'static str, Recipe)>, AdapterError> {
         ("16 bits", surfaces().spectra_dtype(Dtype::F16)),
         ("padded rows", surfaces().layout(Layout::PaddedRows)),
         ("loops", Recipe::builder(&fine)),
+        ("loops, kernel", Recipe::builder(&fine_kernel)),
         ("loops, LRV", Recipe::builder(&fine).lrv(0.4).bounds(Bounds::Scaled)),
     ];
     builders.into_iter().map(|(name, builder)| Ok((name, builder.build()?))).collect()

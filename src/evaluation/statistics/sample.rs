@@ -3,10 +3,11 @@
 use rayon::prelude::*;
 
 use super::tinted::tinted;
-use crate::dataset::SpectrumKind;
+use crate::dataset::{BuiltinTable, Dataset, SpectrumKind};
 use crate::draw_status::DrawStatus;
 use crate::engine::{Batch, Engine, EngineError};
-use crate::model::Model;
+use crate::grid::{Extrapolation, Grid};
+use crate::model::{Fit, FitDistribution, Model};
 use crate::program::Bounds;
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
@@ -31,6 +32,7 @@ impl Scenario {
     /// Every kind of recipe, on the built-in models and on one with properties that no fit gives.
     pub fn all() -> Vec<Scenario> {
         let reflectances = || Model::builtin("munsell-vrhel").expect("it is built in");
+        let kernel = || Model::builtin("munsell-vrhel-kernel").expect("it is built in");
         let daylights = Model::builtin("granada").expect("it is built in");
         let scenario =
             |name: &str, model, target, scale| Scenario { name: name.to_owned(), model, target, scale };
@@ -45,6 +47,9 @@ impl Scenario {
             scenario("LRV 0.6, scaled", reflectances(), Some((0.6, Bounds::Scaled)), 1.0),
             scenario("LRV 0.6, both", reflectances(), Some((0.6, Bounds::Both)), 1.0),
             scenario("illuminants", daylights, None, 1.0),
+            scenario("kernel", kernel(), None, 1.0),
+            scenario("kernel, LRV 0.6, base", kernel(), Some((0.6, Bounds::Base)), 1.0),
+            scenario("mixture", mixture(), None, 1.0),
         ]
     }
 
@@ -60,7 +65,9 @@ impl Scenario {
             Some((lrv, bounds)) => recipe.lrv(lrv).bounds(bounds),
             None => recipe,
         };
-        recipe.build().expect("the recipe can be drawn")
+        let recipe = recipe.build().expect("the recipe can be drawn");
+        assert_eq!(recipe.left_out(), 0, "the oracle would wait for what is left out");
+        recipe
     }
 
     /// Whether no candidate is rejected.
@@ -75,6 +82,14 @@ impl Scenario {
             _ => 1.0,
         }
     }
+}
+
+/// Surfaces in four clusters, each with a covariance of its own.
+fn mixture() -> Model {
+    let tables = [BuiltinTable::Munsell.table(), BuiltinTable::Vrhel.table()];
+    let data = Dataset::new(&tables, Grid::DEFAULT, Extrapolation::Error);
+    let fit = Fit::new(SpectrumKind::Reflectance).distribution(FitDistribution::Mixture(4));
+    fit.fit(&data.expect("the tables have these wavelengths")).expect("surfaces can be fitted")
 }
 
 /// One spectrum, and the number of candidates it took.

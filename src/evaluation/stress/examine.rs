@@ -11,7 +11,7 @@ use crate::draw_status::DrawStatus;
 use crate::engine::{Engine, EngineError};
 use crate::evaluation::statistics::rows;
 use crate::grid::Grid;
-use crate::model::{Model, ModelParts, Normalization};
+use crate::model::{Distribution, Model, ModelParts, Normalization};
 use crate::program::Bounds;
 use crate::random::stream::{DrawRange, Stream};
 use crate::recipe::{Recipe, RecipeBuilder, RecipeError};
@@ -68,6 +68,7 @@ pub(super) fn parts(
         explained_variance: vec![1.0 / k as f64; k],
         normalization: Normalization::None,
         powers: Vec::new(),
+        distribution: Distribution::Gaussian,
         sources: Vec::new(),
     }
 }

@@ -1,4 +1,5 @@
-//! Choice of one of many by one random word, with integer odds, so that every engine chooses the same.
+//! Choice of one of many by one random word, with integer odds, so that every engine chooses the same. GPU twin:
+//! `shaders/alias.wgsl`, which reads the table from a buffer.
 //!
 //! Walker's alias method, by Vose's construction ("A linear algorithm for generating random numbers with a given
 //! distribution", 1991), on integers: the word's top bits choose a column, and the rest choose between the column and
@@ -21,7 +22,7 @@ pub(crate) struct Column {
 }
 
 impl Alias {
-    pub(super) fn new(odds: &[u32]) -> Alias {
+    pub(crate) fn new(odds: &[u32]) -> Alias {
         let bits = odds.len().next_power_of_two().trailing_zeros().max(1);
         let room = 1u32 << (32 - bits);
         let mut left = odds.to_vec();
@@ -42,12 +43,19 @@ impl Alias {
         Alias { bits, columns }
     }
 
+    /// The columns, a word each: as many of a threshold's low bits are zero as an alias has.
+    pub(crate) fn packed(&self) -> Vec<u32> {
+        self.columns.iter().map(|column| column.threshold | column.alias).collect()
+    }
+
     /// Returns the number that a word chooses.
     #[inline(always)]
     pub(crate) fn choose(&self, word: u32) -> u32 {
         let column = word >> (32 - self.bits);
         let Column { threshold, alias } = self.columns[column as usize];
-        if word << self.bits < threshold { column } else { alias }
+        // No branch: half of the time it would be mispredicted.
+        let own = u32::from(word << self.bits < threshold).wrapping_neg();
+        column & own | alias & !own
     }
 }
 
@@ -55,7 +63,7 @@ impl Alias {
 impl Alias {
     /// Number of all 2^32 words that choose each column, by choosing: in each column the words below a threshold
     /// choose one number, and all others another.
-    pub(super) fn shares(&self) -> Vec<u64> {
+    pub(crate) fn shares(&self) -> Vec<u64> {
         let room = 1u64 << (32 - self.bits);
         let mut shares = vec![0; self.columns.len()];
         for column in 0..self.columns.len() as u64 {
@@ -77,7 +85,7 @@ impl Alias {
 
 /// Returns odds that sum to 2^32, in proportion to weights: rounded up, so that nothing is left out, and the factor
 /// of at least 1 by which rounding raised each. The last number is the odds that a weight of 1 would have got.
-pub(super) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
+pub(crate) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
     const WORDS: f64 = 4_294_967_296.0;
     let total: f64 = weights.iter().sum();
     let scale = (WORDS - weights.len() as f64 - 1.0) / total;
@@ -87,6 +95,21 @@ pub(super) fn odds(weights: &[f64]) -> (Vec<u32>, Vec<f64>, f64) {
     let unit = odds.iter().zip(weights).map(|(&o, w)| o as f64 / w).fold(f64::INFINITY, f64::min);
     let excess = odds.iter().zip(weights).map(|(&o, w)| o as f64 / (w * unit)).collect();
     (odds.into_iter().map(|o| o.min(u64::from(u32::MAX)) as u32).collect(), excess, unit)
+}
+
+/// Returns odds that sum to 2^32, in proportion to weights, each rounded up or down: up where that changes it least. What
+/// has no weight, and next to what has less than 2^-33 of all, gets none.
+pub(crate) fn nearest_odds(weights: &[f64]) -> Vec<u32> {
+    const WORDS: u64 = 1 << 32;
+    let scale = WORDS as f64 / weights.iter().sum::<f64>();
+    let exact: Vec<f64> = weights.iter().map(|weight| weight * scale).collect();
+    let mut odds: Vec<u64> = exact.iter().map(|odds| *odds as u64).collect();
+    let mut by_rest: Vec<usize> = (0..odds.len()).filter(|&i| weights[i] > 0.0).collect();
+    by_rest.sort_by(|&a, &b| (exact[b] - exact[b].floor()).total_cmp(&(exact[a] - exact[a].floor())));
+    let left = WORDS.saturating_sub(odds.iter().sum());
+    by_rest.iter().cycle().take(left as usize).for_each(|&i| odds[i] += 1);
+    // One that has them all is chosen by what is left over too.
+    odds.into_iter().map(|odds| odds.min(u64::from(u32::MAX)) as u32).collect()
 }
 
 #[cfg(test)]
@@ -114,8 +137,46 @@ mod tests {
     }
 
     #[test]
+    fn nearest_odds_are_within_a_word_of_exact_ones() {
+        for count in [2, 3, 1000, 1024, 1 << 16] {
+            let weights: Vec<f64> = (1..=count).map(|i| (f64::from(i) * 7.7).sin().max(0.0)).collect();
+            let odds = nearest_odds(&weights);
+            let total: f64 = weights.iter().sum();
+            assert_eq!(odds.iter().map(|&o| u64::from(o)).sum::<u64>(), 1 << 32);
+            for (&odds, weight) in odds.iter().zip(&weights) {
+                let exact = weight / total * 2f64.powi(32);
+                assert!(
+                    (f64::from(odds) - exact).abs() < 1.0 && (*weight > 0.0 || odds == 0),
+                    "{odds} {exact}"
+                );
+            }
+            let shares = Alias::new(&odds).shares();
+            assert!(
+                shares.iter().zip(odds.iter().chain(std::iter::repeat(&0))).all(|(&s, &o)| s == u64::from(o))
+            );
+        }
+        // The rest falls to the larger parts.
+        assert_eq!(nearest_odds(&[1.0, 1.0, 1.0]), [1_431_655_766, 1_431_655_765, 1_431_655_765]);
+        assert_eq!(nearest_odds(&[1.0, 1e-12]), [u32::MAX, 0]);
+    }
+
+    #[test]
+    fn a_packed_column_has_both_of_its_numbers() {
+        for count in [1, 2, 3, 1000, 1025] {
+            let weights: Vec<f64> = (0..count).map(|i| (f64::from(i) * 7.7).sin().abs()).collect();
+            let alias = Alias::new(&nearest_odds(&weights));
+            let low = (1u32 << alias.bits) - 1;
+            for (column, packed) in alias.columns.iter().zip(alias.packed()) {
+                assert_eq!((packed & !low, packed & low), (column.threshold, column.alias));
+            }
+        }
+    }
+
+    #[test]
     fn one_choice_is_no_choice() {
-        let alias = Alias::new(&odds(&[0.25]).0);
-        assert!([0, 1, 1 << 31, u32::MAX].iter().all(|&word| alias.choose(word) == 0));
+        for odds in [odds(&[0.25]).0, nearest_odds(&[0.25]), nearest_odds(&[1.0, 0.0])] {
+            let alias = Alias::new(&odds);
+            assert!([0, 1, 1 << 31, u32::MAX].iter().all(|&word| alias.choose(word) == 0));
+        }
     }
 }
