@@ -146,7 +146,7 @@ fn tables_that_a_device_cannot_bind_are_an_error() {
         .expect("it has a cover");
     let error = Sampler::new(&device, &recipe).unwrap_err();
     let SamplerError::LargeTable { label, bytes, largest, limit } = error else { panic!("{error}") };
-    assert!(label == "spectroll cover" && bytes > 4096 && largest == 4096, "{label} {bytes} {largest}");
+    assert!(label == "spectroll proposal" && bytes > 4096 && largest == 4096, "{label} {bytes} {largest}");
     assert_eq!(limit, "max_buffer_size");
 }
 
