@@ -230,9 +230,6 @@ fn normalization(name: &str) -> Result<Normalization> {
     choice("normalize", name, &all)
 }
 
-/// The number of normal distributions of a mixture, unless another is asked for.
-const MIXTURE_COMPONENTS: usize = 3;
-
 /// The distribution of a name, with a bandwidth or a number of normal distributions.
 fn distribution((name, bandwidth, normals): (&str, Option<f64>, Option<usize>)) -> Result<FitDistribution> {
     let all = ["gaussian", "kernel", "mixture"].map(|name| (name, name));
@@ -247,7 +244,7 @@ fn distribution((name, bandwidth, normals): (&str, Option<f64>, Option<usize>)) 
     }
     Ok(match name {
         "kernel" => FitDistribution::Kernel(bandwidth),
-        "mixture" => FitDistribution::Mixture(normals.unwrap_or(MIXTURE_COMPONENTS)),
+        "mixture" => FitDistribution::Mixture(normals.unwrap_or(FitDistribution::MIXTURE_COMPONENTS)),
         _ => FitDistribution::Gaussian,
     })
 }

@@ -94,9 +94,6 @@ fn bandwidth(text: &str) -> Result<Bandwidth, String> {
     }
 }
 
-/// The number of normal distributions of a mixture, unless another is asked for.
-const MIXTURE_COMPONENTS: usize = 3;
-
 impl Arguments {
     /// The distribution that is asked for.
     fn distribution(&self) -> anyhow::Result<FitDistribution> {
@@ -115,7 +112,7 @@ impl Arguments {
             }
             (DistributionKind::Kernel, ..) => Ok(FitDistribution::Kernel(None)),
             (DistributionKind::Mixture, _, normals) => {
-                Ok(FitDistribution::Mixture(normals.unwrap_or(MIXTURE_COMPONENTS)))
+                Ok(FitDistribution::Mixture(normals.unwrap_or(FitDistribution::MIXTURE_COMPONENTS)))
             }
         }
     }

@@ -9,7 +9,7 @@ use spectroll::export::{DrawExport, Output, Writing};
 use spectroll::output::SetStatus;
 use spectroll::wording::counted;
 use spectroll::{
-    ArithmeticVerdict, DrawRange, DrawSummary, EngineChoice, Grid, Model, Stream, wanted_backends,
+    ArithmeticVerdict, DrawRange, DrawSummary, EngineChoice, Grid, Recipe, Stream, wanted_backends,
 };
 
 use super::exit::Usage;
@@ -141,7 +141,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     report(
         arguments,
         &output,
-        (&model, outcome),
+        (&recipe, outcome),
         &Report {
             model: arguments.model.clone(),
             output: arguments.output.output.display().to_string(),
@@ -168,7 +168,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 fn report(
     arguments: &Arguments,
     output: &Output,
-    (model, outcome): (&Model, SetStatus),
+    (recipe, outcome): (&Recipe, SetStatus),
     made: &Report,
 ) -> anyhow::Result<()> {
     if arguments.json {
@@ -182,7 +182,7 @@ fn report(
         tell!("{}: {kind}{spectra} of {}{above}", made.output, counted(made.bands as u64, "band", "bands"));
         let accepted = made.acceptance.map_or(String::new(), |a| format!(" ({:.4} % accepted)", 100.0 * a));
         tell!("  {}{accepted}, seed {}", counted(attempts, "candidate", "candidates"), made.seed);
-        for warning in run::doubts(model) {
+        for warning in run::doubts(recipe.model()).chain(run::left_out(recipe)) {
             tell!("  {warning}");
         }
         let rate = match draws {

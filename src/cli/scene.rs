@@ -12,7 +12,7 @@ use spectroll::output::{OutputError, PendingFile, Schema, SetStatus};
 use spectroll::plain_file::read_text;
 use spectroll::scene::{GroupSummary, MAX_FILE_BYTES, PRESETS, Scene, Workload};
 use spectroll::wording::{counted, grouped};
-use spectroll::{ArithmeticVerdict, Dtype, Engine, Quantity};
+use spectroll::{ArithmeticVerdict, Distribution, Dtype, Engine, Quantity, Recipe};
 
 use super::exit::Usage;
 use super::interrupt;
@@ -317,7 +317,10 @@ impl Job<'_> {
                 tell!("  {group}: {} drawn{accepted}{above}", counted(summary.draws, "spectrum", "spectra"));
             }
             for (group, model) in self.scene.models() {
-                for warning in run::doubts(model) {
+                let is_gaussian = *model.distribution() == Distribution::Gaussian;
+                let recipe = if is_gaussian { None } else { Recipe::builder(model).build().ok() };
+                let left_out = recipe.as_ref().and_then(run::left_out);
+                for warning in run::doubts(model).chain(left_out) {
                     tell!("  {group}: {warning}");
                 }
             }

@@ -1,5 +1,7 @@
 //! Bounds as half-spaces of the standard normals.
 
+use crate::affine::Affine;
+
 /// Largest accepted distance from the mean, in standard deviations of each component.
 pub(crate) const REACH: f64 = 13.0;
 
@@ -11,6 +13,19 @@ pub(crate) struct HalfSpace {
     pub(crate) normal: Vec<f64>,
     /// Distance of the bound from the mean in standard deviations, unless the normal is 0.
     pub(crate) room: f64,
+}
+
+/// Bounds of physical spectra of a map: above 0 and, where it is so, below 1.
+pub(crate) fn physical(spectrum: &Affine, is_below_one: bool) -> Vec<HalfSpace> {
+    let mut half_spaces = Vec::new();
+    for (band, &offset) in spectrum.offset.iter().enumerate() {
+        let gains = || spectrum.gain.iter().map(|gain| gain[band]);
+        half_spaces.push(HalfSpace::new(band, gains().map(|g| -g).collect(), offset));
+        if is_below_one {
+            half_spaces.push(HalfSpace::new(band, gains().collect(), 1.0 - offset));
+        }
+    }
+    half_spaces
 }
 
 impl HalfSpace {

@@ -26,7 +26,7 @@ use simplex::Polytope;
 use simplex::Sides;
 
 pub(crate) use frame::Frame;
-pub(crate) use half_space::{HalfSpace, REACH};
+pub(crate) use half_space::{HalfSpace, REACH, physical};
 pub(crate) use mixture::BoxMixture;
 
 use crate::random::alias::{Alias, odds};

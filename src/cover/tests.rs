@@ -7,7 +7,7 @@ use crate::affine::Affine;
 use crate::colorimetry::lrv_weights;
 use crate::model::Model;
 use crate::program::feasibility::{Room, half_spaces, room};
-use crate::program::{self, Bounds, LrvLaw, LrvTarget, Program};
+use crate::program::{Bounds, LrvLaw, LrvTarget, Program};
 use crate::random::real::Real;
 use crate::random::stream::StreamRng;
 use rand::Rng;
@@ -24,7 +24,7 @@ fn program(lrv: Option<f64>, covariance_scale: f64) -> Program {
         given: 0,
         target,
         max_attempts: 1000,
-        ..Program::new(&SURFACES, &program::weights(&SURFACES, covariance_scale))
+        ..Program::new(&SURFACES, &SURFACES.weight_map(covariance_scale))
     }
 }
 
@@ -380,7 +380,7 @@ fn intervals_and_free_axes_are_covered() {
     let one = |gain: Vec<Vec<f64>>| Program {
         given: 0,
         spectrum: Affine { offset: vec![0.5; 3], gain },
-        ..Program::new(&SURFACES, &program::weights(&SURFACES, 1.0))
+        ..Program::new(&SURFACES, &SURFACES.weight_map(1.0))
     };
     // |z| < 2.5, of probability 0.98758.
     let interval = cover_of(&one(vec![vec![0.1, 0.2, -0.1]]), BOXES);

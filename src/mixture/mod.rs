@@ -1,5 +1,5 @@
 //! Candidates from normal distributions about many centres: of a model whose weights are not normal. GPU twin:
-//! `shaders/mixture.wgsl`, which reads the same numbers from a buffer.
+//! `shaders/mixture_looped.wgsl` and, in straight lines, `src/wgsl/mixture.rs`, with the same numbers from a buffer.
 //!
 //! In the frame of the standard normals z, in which the model's mean is 0 and its covariance 1, a candidate is
 //! `c + F z`: one word chooses the centre c and its lower triangular factor F, and the normals are those of the same
@@ -24,7 +24,7 @@ use crate::cover::HalfSpace;
 use crate::random::alias::{Alias, nearest_odds};
 use crate::random::real::Real;
 
-/// The most centres: what the table of a buffer of 128 MiB, which every adapter has, holds of 6 components.
+/// The most centres: of up to 28 components, the table of as many fits the 128 MiB that every adapter binds.
 pub(crate) const MOST_CENTRES: usize = 1 << 20;
 
 /// The least acceptance of a centre's candidates. A centre with less has no share: its candidates, nearly all of which

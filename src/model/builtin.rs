@@ -1,6 +1,5 @@
 //! The models that are built in, and the data that they are fitted to.
 
-use super::fit::projected;
 use super::{Fit, FitDistribution, Model, ModelError};
 use crate::dataset::{BuiltinTable, Dataset, ResampleMethod, Resampling, SpectrumKind, Table};
 use crate::grid::Grid;
@@ -183,7 +182,7 @@ impl Family {
         let (mut spectra, _) =
             divided.map_err(|source| ModelError::BuiltinFit { name, grid, source: source.into() })?;
         spectra.column_iter_mut().for_each(|mut spectrum| spectrum -= &parts.mean);
-        Ok(FitDistribution::Kernel(Some(bandwidth)).of(&model, projected(&parts.basis, &spectra)))
+        Ok(FitDistribution::Kernel(Some(bandwidth)).of(model, &spectra))
     }
 
     fn dataset(&self, name: &str, grid: &Grid) -> Result<Dataset, ModelError> {

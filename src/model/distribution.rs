@@ -5,8 +5,8 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
-use super::{Model, ModelError, check_covariance, is_diagonal, matrix};
-use crate::cover::HalfSpace;
+use super::{Model, ModelError, are_finite, check_covariance, has_shape, is_diagonal, matrix, rows};
+use crate::cover::{HalfSpace, physical};
 use crate::dataset::SpectrumKind;
 use crate::mixture::{Centres, MOST_CENTRES, Spread, triangle};
 use crate::wording::counted;
@@ -92,14 +92,6 @@ impl Distribution {
 
     /// Checks the distribution of k weights.
     pub(super) fn check(&self, k: usize) -> Result<(), ModelError> {
-        let shape = |field, found, expected| match found == expected {
-            true => Ok(()),
-            false => Err(ModelError::Shape { field, found, expected }),
-        };
-        let finite = |field, values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
-            Some(&value) => Err(ModelError::NotFinite { field, value }),
-            None => Ok(()),
-        };
         if self.is_empty() || self.len() > MOST_CENTRES {
             return Err(ModelError::Centres { name: self.name(), found: self.len() });
         }
@@ -109,18 +101,18 @@ impl Distribution {
                 if !(0.0..=1.0).contains(bandwidth) {
                     return Err(ModelError::Bandwidth(*bandwidth));
                 }
-                shape("a row of distribution.weights", weights.ncols(), k)?;
-                finite("distribution.weights", weights.as_slice())
+                has_shape("a row of distribution.weights", weights.ncols(), k)?;
+                are_finite("distribution.weights", weights.as_slice())
             }
             Distribution::Mixture(components) => components.iter().try_for_each(|component| {
                 if !(component.share.is_finite() && component.share > 0.0) {
                     return Err(ModelError::Share(component.share));
                 }
-                shape("a mean of distribution", component.mean.len(), k)?;
-                shape("a covariance of distribution", component.covariance.nrows(), k)?;
-                shape("a row of a covariance of distribution", component.covariance.ncols(), k)?;
-                finite("distribution.mean", component.mean.as_slice())?;
-                finite("distribution.covariance", component.covariance.as_slice())?;
+                has_shape("a mean of distribution", component.mean.len(), k)?;
+                has_shape("a covariance of distribution", component.covariance.nrows(), k)?;
+                has_shape("a row of a covariance of distribution", component.covariance.ncols(), k)?;
+                are_finite("distribution.mean", component.mean.as_slice())?;
+                are_finite("distribution.covariance", component.covariance.as_slice())?;
                 check_covariance(&component.covariance)
             }),
         }
@@ -192,19 +184,7 @@ impl Model {
 
     /// Bounds of physical spectra, as half-spaces of the standard normals.
     pub(crate) fn half_spaces(&self) -> Vec<HalfSpace> {
-        let spectra = self.parts.basis.tr_mul(&self.weight_factor());
-        let centre = self.reconstruct(self.parts.weight_mean.as_slice());
-        let bound = |band: usize, sign: f64, room: f64| {
-            HalfSpace::new(band, spectra.row(band).iter().map(|gain| sign * gain).collect(), room)
-        };
-        let bands = 0..self.bands();
-        let below = bands.clone().map(|band| bound(band, -1.0, centre[band]));
-        match self.kind() {
-            SpectrumKind::Illuminant => below.collect(),
-            SpectrumKind::Reflectance => {
-                below.chain(bands.map(|band| bound(band, 1.0, 1.0 - centre[band]))).collect()
-            }
-        }
+        physical(&self.spectrum_map(&self.weight_map(1.0)), self.kind() == SpectrumKind::Reflectance)
     }
 }
 
@@ -249,9 +229,6 @@ pub(super) struct ComponentRecord {
 
 impl DistributionRecord {
     pub(super) fn of(distribution: &Distribution) -> Option<DistributionRecord> {
-        let rows = |m: &DMatrix<f64>| -> Vec<Vec<f64>> {
-            m.row_iter().map(|row| row.iter().copied().collect()).collect()
-        };
         match distribution {
             Distribution::Gaussian => None,
             Distribution::Kernel { bandwidth, weights } => {

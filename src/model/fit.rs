@@ -44,6 +44,11 @@ pub enum FitDistribution {
     Mixture(usize),
 }
 
+impl FitDistribution {
+    /// Number of normal distributions of a mixture, unless another is asked for.
+    pub const MIXTURE_COMPONENTS: usize = 3;
+}
+
 /// Number of components to keep.
 #[derive(Clone, Copy, Debug)]
 enum Size {
@@ -193,7 +198,7 @@ impl Fit {
         let k = match self.size {
             Size::Components(k) if k > rank => return Err(FitError::Rank { components: k, rank }),
             Size::Components(k) => k,
-            Size::Share(share) => enough(&singular.as_slice()[..rank], share * total),
+            Size::Share(share) => enough(singular.iter().take(rank).map(|s| s * s), share * total),
         };
         if k > MAX_COMPONENTS {
             return Err(FitError::Components(k));
@@ -201,7 +206,6 @@ impl Fit {
         // In the principal frame the weights have mean zero and a diagonal covariance (eq. 4, with 1/M).
         let variances = singular.rows(0, k).map(|s| s * s / spectra as f64);
         let basis = basis.rows(0, k).into_owned();
-        let weights = projected(&basis, &centred);
         let model = Model::new(ModelParts {
             kind: self.kind,
             grid: data.grid().clone(),
@@ -216,19 +220,22 @@ impl Fit {
             sources: data.sources().to_vec(),
         });
         let model = model.expect("singular vectors are orthonormal and variances are not negative");
-        Ok(self.distribution.of(&model, weights))
+        Ok(self.distribution.of(model, &centred))
     }
 }
 
 impl FitDistribution {
-    /// The model with its weights so distributed, where those of the data are these, a row each.
-    pub(super) fn of(self, model: &Model, weights: DMatrix<f64>) -> Model {
+    /// The Gaussian model with its weights so distributed, where these are the data less their mean, a spectrum a column.
+    pub(super) fn of(self, model: Model, centred: &DMatrix<f64>) -> Model {
         let k = model.components();
+        let weights = || projected(&model.parts().basis, centred);
         let distribution = match self {
-            FitDistribution::Gaussian => Distribution::Gaussian,
+            FitDistribution::Gaussian => return model,
             FitDistribution::Kernel(bandwidth) => {
+                let weights = weights();
                 let auto = || {
-                    let judged = most_of(&model.parts().explained_variance);
+                    let explained = &model.parts().explained_variance;
+                    let judged = enough(explained.iter().copied(), MOST * explained.iter().sum::<f64>());
                     mixture::bandwidth(&model.whitened(&weights), [k, judged], &model.half_spaces())
                 };
                 Distribution::Kernel { bandwidth: bandwidth.unwrap_or_else(auto), weights }
@@ -240,7 +247,7 @@ impl FitDistribution {
                     mean: mean + &factor * normal.mean,
                     covariance: &factor * normal.covariance * factor.transpose(),
                 };
-                let found = mixture::normals(&model.whitened(&weights), k, normals);
+                let found = mixture::normals(&model.whitened(&weights()), k, normals);
                 Distribution::Mixture(found.into_iter().map(component).collect())
             }
         };
@@ -251,19 +258,9 @@ impl FitDistribution {
 /// The share of the variance in a model that the components have by which a bandwidth is judged.
 const MOST: f64 = 0.99;
 
-/// Number of the first components that explain nearly all that a model does.
-fn most_of(explained: &[f64]) -> usize {
-    let all: f64 = explained.iter().sum();
-    let sums = explained.iter().scan(0.0, |sum, share| {
-        *sum += share;
-        Some(*sum)
-    });
-    sums.take_while(|sum| *sum < MOST * all).count() + 1
-}
-
 /// The weights of centred spectra, a column each; of the weights, a row each. Sums in one order, so that they are the same
 /// to the last bit on every machine.
-pub(super) fn projected(basis: &DMatrix<f64>, centred: &DMatrix<f64>) -> DMatrix<f64> {
+fn projected(basis: &DMatrix<f64>, centred: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(centred.ncols(), basis.nrows(), |spectrum, component| {
         (0..basis.ncols()).map(|band| basis[(component, band)] * centred[(band, spectrum)]).sum()
     })
@@ -304,13 +301,14 @@ impl Normalization {
     }
 }
 
-/// Number of these values, in order, whose squares sum to `wanted`; all of them where rounding leaves less.
-fn enough(singular: &[f64], wanted: f64) -> usize {
-    let sums = singular.iter().scan(0.0, |sum, s| {
-        *sum += s * s;
+/// Number of these parts, in order, that sum to `wanted`; all of them where rounding leaves less.
+fn enough(parts: impl ExactSizeIterator<Item = f64>, wanted: f64) -> usize {
+    let all = parts.len();
+    let sums = parts.scan(0.0, |sum, part| {
+        *sum += part;
         Some(*sum)
     });
-    (sums.take_while(|&sum| sum < wanted).count() + 1).min(singular.len())
+    (sums.take_while(|&sum| sum < wanted).count() + 1).min(all)
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ pub use fit::{Fit, FitDistribution, FitError};
 
 use distribution::DistributionRecord;
 
+use crate::affine::Affine;
 use crate::dataset::{SpectrumKind, Table};
 use crate::grid::{Grid, GridError};
 use crate::plain_file;
@@ -162,17 +163,10 @@ impl Model {
             ("explained_variance", &parts.explained_variance, k),
         ];
         for (field, values, expected) in fields {
-            if values.len() != expected {
-                return Err(ModelError::Shape { field, found: values.len(), expected });
-            }
-            if let Some(&value) = values.iter().find(|v| !v.is_finite()) {
-                return Err(ModelError::NotFinite { field, value });
-            }
+            has_shape(field, values.len(), expected)?;
+            are_finite(field, values)?;
         }
-        if parts.weight_covariance.nrows() != k {
-            let found = parts.weight_covariance.nrows();
-            return Err(ModelError::Shape { field: "a column of weight_covariance", found, expected: k });
-        }
+        has_shape("a column of weight_covariance", parts.weight_covariance.nrows(), k)?;
         let mut explained = 0.0;
         for &share in &parts.explained_variance {
             explained += share;
@@ -288,6 +282,26 @@ impl Model {
     }
 }
 
+impl Model {
+    /// The weights as a map of k standard normals.
+    pub(crate) fn weight_map(&self, covariance_scale: f64) -> Affine {
+        let factor = self.weight_factor() * covariance_scale.sqrt();
+        Affine {
+            offset: self.parts.weight_mean.as_slice().to_vec(),
+            gain: factor.column_iter().map(|column| column.iter().copied().collect()).collect(),
+        }
+    }
+
+    /// The spectrum as a map of what the weights are one of.
+    pub(crate) fn spectrum_map(&self, weights: &Affine) -> Affine {
+        let columns: Vec<_> =
+            self.parts.basis.column_iter().map(|c| c.iter().copied().collect::<Vec<_>>()).collect();
+        let mut spectrum = weights.project(&columns);
+        spectrum.offset.iter_mut().zip(&self.parts.mean).for_each(|(s, mean)| *s += mean);
+        spectrum
+    }
+}
+
 fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
     matrix.row_iter().enumerate().all(|(i, row)| row.iter().enumerate().all(|(j, &v)| i == j || v == 0.0))
 }
@@ -364,7 +378,6 @@ struct File {
 
 impl File {
     fn from_parts(parts: &ModelParts) -> File {
-        let rows = |m: &DMatrix<f64>| m.row_iter().map(|row| row.iter().copied().collect()).collect();
         File {
             schema: SCHEMA,
             kind: parts.kind,
@@ -401,6 +414,21 @@ impl File {
             sources: self.sources,
         })
     }
+}
+
+fn has_shape(field: &'static str, found: usize, expected: usize) -> Result<(), ModelError> {
+    if found == expected { Ok(()) } else { Err(ModelError::Shape { field, found, expected }) }
+}
+
+fn are_finite(field: &'static str, values: &[f64]) -> Result<(), ModelError> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(&value) => Err(ModelError::NotFinite { field, value }),
+        None => Ok(()),
+    }
+}
+
+fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
 /// A matrix of rows that must each have `columns` values.

@@ -104,11 +104,11 @@ mod tests {
     use super::*;
     use crate::colorimetry::xyz_weights;
     use crate::model::Model;
-    use crate::program::{Program, weights};
+    use crate::program::Program;
 
     fn surfaces() -> (Model, Program, Affine) {
         let model = Model::builtin("munsell-vrhel").unwrap();
-        let program = Program::new(&model, &weights(&model, 1.0));
+        let program = Program::new(&model, &model.weight_map(1.0));
         let xyz = program.spectrum.project(&xyz_weights(model.grid()).unwrap());
         (model, program, xyz)
     }
@@ -128,7 +128,7 @@ mod tests {
     fn mean_and_covariance_are_the_closed_form() {
         let (model, _, xyz) = surfaces();
         let target = [0.25, 0.3, 0.2];
-        let map = weights(&model, 1.0);
+        let map = model.weight_map(1.0);
         let given = Condition::new(&xyz).unwrap().given(&target, &map);
         let k = model.components();
         let factor = DMatrix::from_fn(k, k, |row, column| map.gain[column][row]);

@@ -9,7 +9,7 @@ use microlp::{ComparisonOp, OptimizationDirection, Problem, Variable};
 
 use super::{Bounds, Program};
 use crate::affine::Affine;
-use crate::cover::{HalfSpace, REACH};
+use crate::cover::{HalfSpace, REACH, physical};
 use crate::dataset::SpectrumKind;
 
 /// Coefficients of unit rows below this are dropped: together they move no bound by 1e-7, the solver's tolerance.
@@ -115,15 +115,8 @@ pub(crate) fn nearest(program: &Program, responses: &Affine, target: &[f64]) -> 
 
 /// The bounds that a program's rule sets: those of the largest target, where each draw has its own.
 pub(crate) fn half_spaces(program: &Program) -> Vec<HalfSpace> {
-    let gains = |band: usize| program.spectrum.gain.iter().map(move |gain| gain[band]);
-    let mut half_spaces = Vec::new();
-    let mut push = |band, coefficients, room| half_spaces.push(HalfSpace::new(band, coefficients, room));
-    for band in 0..program.bands() {
-        push(band, gains(band).map(|g| -g).collect(), program.spectrum.offset[band]); // s > 0
-        if program.kind == SpectrumKind::Reflectance && program.tests_base() {
-            push(band, gains(band).collect(), 1.0 - program.spectrum.offset[band]); // s < 1
-        }
-    }
+    let is_below_one = program.kind == SpectrumKind::Reflectance && program.tests_base();
+    let mut half_spaces = physical(&program.spectrum, is_below_one);
     if let Some(target) = program.target.as_ref().filter(|t| t.bounds != Bounds::Base) {
         let lrv_of = |values: &[f64]| values.iter().zip(&target.weights).map(|(v, w)| v * w).sum::<f64>();
         let (lrv_offset, lrv_gain) =
@@ -132,8 +125,10 @@ pub(crate) fn half_spaces(program: &Program) -> Vec<HalfSpace> {
         let lrv = target.lrv.largest();
         for band in 0..program.bands() {
             // lrv . s < LRV(s)
-            let coefficients = gains(band).zip(&lrv_gain).map(|(g, l)| lrv * g - l).collect();
-            push(band, coefficients, lrv_offset - lrv * program.spectrum.offset[band]);
+            let gains = program.spectrum.gain.iter().map(|gain| gain[band]);
+            let coefficients = gains.zip(&lrv_gain).map(|(g, l)| lrv * g - l).collect();
+            let room = lrv_offset - lrv * program.spectrum.offset[band];
+            half_spaces.push(HalfSpace::new(band, coefficients, room));
         }
     }
     half_spaces
@@ -159,7 +154,7 @@ mod tests {
     }
     use crate::colorimetry::lrv_weights;
     use crate::model::Model;
-    use crate::program::{self, LrvLaw, LrvTarget};
+    use crate::program::{LrvLaw, LrvTarget};
 
     /// Reflectances of 3 bands that vary in one shape: 0.5 + 0.1 z, 0.5 + 0.2 z, 0.5 - 0.1 z.
     fn ramp(target: Option<(f64, Bounds)>) -> Program {
@@ -216,7 +211,7 @@ mod tests {
     fn the_largest_lrv_of_munsell_and_vrhel() {
         let model = Model::builtin("munsell-vrhel").unwrap();
         let weights = lrv_weights(model.grid()).unwrap();
-        let largest = largest_lrv(&Program::new(&model, &program::weights(&model, 1.0)), &weights).unwrap();
+        let largest = largest_lrv(&Program::new(&model, &model.weight_map(1.0)), &weights).unwrap();
         assert!((largest - 0.995928).abs() < 1e-6, "{largest}");
     }
 }

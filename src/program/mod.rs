@@ -76,14 +76,9 @@ pub(crate) struct Program {
 impl Program {
     /// Makes a program for physical draws of a model with these weights, without outputs.
     pub(crate) fn new(model: &Model, weights: &Affine) -> Program {
-        let parts = model.parts();
-        let columns: Vec<_> =
-            parts.basis.column_iter().map(|c| c.iter().copied().collect::<Vec<_>>()).collect();
-        let mut spectrum = weights.project(&columns);
-        spectrum.offset.iter_mut().zip(&parts.mean).for_each(|(s, mean)| *s += mean);
         Program {
-            kind: parts.kind,
-            spectrum,
+            kind: model.kind(),
+            spectrum: model.spectrum_map(weights),
             target: None,
             intensity: None,
             proposal: None,
@@ -226,14 +221,5 @@ impl Program {
     /// Whether scaling may take an accepted spectrum to 1 or above.
     pub(crate) fn may_exceed_one(&self) -> bool {
         self.target.as_ref().is_some_and(|t| t.bounds == Bounds::Base)
-    }
-}
-
-/// The weights of a model as a map of z.
-pub(crate) fn weights(model: &Model, covariance_scale: f64) -> Affine {
-    let factor = model.weight_factor() * covariance_scale.sqrt();
-    Affine {
-        offset: model.parts().weight_mean.as_slice().to_vec(),
-        gain: factor.column_iter().map(|column| column.iter().copied().collect()).collect(),
     }
 }

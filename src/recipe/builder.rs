@@ -15,7 +15,7 @@ use crate::mixture::Centres;
 use crate::model::{Distribution, Model};
 use crate::program::condition::Condition;
 use crate::program::feasibility::{self, Room};
-use crate::program::{self, Bounds, IntensityLaw, LrvLaw, LrvTarget, Program, Proposal};
+use crate::program::{Bounds, IntensityLaw, LrvLaw, LrvTarget, Program, Proposal};
 use crate::quantity::{Dtype, Layout, Quantity};
 use crate::sensors::{ResponseScale, SensorError, Sensors};
 
@@ -273,7 +273,7 @@ impl RecipeBuilder {
             return Err(RecipeError::Pointless { setting, needs });
         }
         let target = self.scaling()?;
-        let mut weights = program::weights(&self.model, self.covariance_scale);
+        let mut weights = self.model.weight_map(self.covariance_scale);
         if let Some(xyz) = self.xyz {
             if !(xyz.iter().all(|v| v.is_finite()) && xyz[1] > 0.0 && xyz[1] < 1.0) {
                 return Err(RecipeError::Xyz(xyz));
@@ -440,7 +440,7 @@ impl RecipeBuilder {
     /// The recipe of draws that are given responses, tried at those of the model's mean.
     fn given_its_own(self, program: Program) -> Result<Recipe, RecipeError> {
         let sensors = self.given.as_ref().expect("the program is given responses");
-        let weights = program::weights(&self.model, self.covariance_scale);
+        let weights = self.model.weight_map(self.covariance_scale);
         let mean = self.responses(sensors, &weights)?.offset;
         let program_of_mean = program.at(&mean);
         self.centre(&program_of_mean, &feasibility::half_spaces(&program_of_mean))?;
@@ -458,7 +458,7 @@ impl RecipeBuilder {
 
     /// The program of the model's own Gaussian, and the map of the responses that draws are given.
     pub(super) fn free(&self) -> Result<(Program, Affine), RecipeError> {
-        let weights = program::weights(&self.model, self.covariance_scale);
+        let weights = self.model.weight_map(self.covariance_scale);
         let sensors = self.given.as_ref().expect("the recipe gives draws responses");
         Ok((Program::new(&self.model, &weights), self.responses(sensors, &weights)?))
     }
@@ -517,7 +517,7 @@ impl RecipeBuilder {
     /// The nearest tristimulus values that can be drawn. The very nearest leave no room for a spectrum to vary in, so
     /// these are a little of the way from there to those of the mean.
     fn nearest(&self, xyz: [f64; 3]) -> Option<[f64; 3]> {
-        let weights = program::weights(&self.model, self.covariance_scale);
+        let weights = self.model.weight_map(self.covariance_scale);
         let (program, map) = self.seen(&weights).ok()?;
         let nearest = feasibility::nearest(&program, &map, &xyz)?;
         let steps = (0..16).map(|doublings| 1e-4 * f64::from(1 << doublings)).take_while(|&part| part < 1.0);

@@ -26,7 +26,7 @@ use crate::affine::Affine;
 use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::model::Model;
-use crate::program::{self, Program, Proposal, feasibility};
+use crate::program::{Program, Proposal, feasibility};
 use crate::quantity::{ArrayFormat, Quantity, ValueRange};
 use crate::random::real::Real;
 use crate::random::stream::Stream;
@@ -169,7 +169,7 @@ impl Recipe {
     pub fn largest_lrv(model: &Model) -> Option<f64> {
         let weights =
             colorimetry::lrv_weights(model.grid()).filter(|_| model.kind() == SpectrumKind::Reflectance)?;
-        feasibility::largest_lrv(&Program::new(model, &program::weights(model, 1.0)), &weights)
+        feasibility::largest_lrv(&Program::new(model, &model.weight_map(1.0)), &weights)
     }
 
     /// The model.

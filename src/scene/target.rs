@@ -7,7 +7,7 @@ use crate::cpu::Kernel;
 use crate::dataset::SpectrumKind;
 use crate::draw_status::DrawStatus;
 use crate::program::condition::Condition;
-use crate::program::{self, Bounds, LrvLaw, LrvTarget, Program};
+use crate::program::{Bounds, LrvLaw, LrvTarget, Program};
 use crate::random::real::DrawOperations;
 use crate::random::stream::{self, Stream};
 use crate::recipe::{DEFAULT_MAX_ATTEMPTS, ProposalKind, Recipe, RecipeBuilder, RecipeError};
@@ -130,7 +130,7 @@ impl TargetPlan {
                 }
                 let recipe =
                     built(builder.clone().xyz(hue.xyz(0, hue.saturation.0, hue.lightness.1)).build())?;
-                let weights = program::weights(model, targets.base.covariance_scale);
+                let weights = model.weight_map(targets.base.covariance_scale);
                 let condition = built_condition(&builder, &weights)?;
                 let spectrum = Program::new(model, &weights).spectrum;
                 let program = Box::new(recipe.program().clone());

@@ -15,7 +15,7 @@
 use super::acceptance::acceptance;
 use super::shader::{LOOPED, LUMINANCE, NORMALS};
 use super::tables::Tables;
-use super::writer::{Text, float, list};
+use super::writer::{Text, float, list, word};
 use super::{Arithmetic, Form, Part};
 use crate::affine::Affine;
 use crate::mixture::Mixture;
@@ -147,7 +147,6 @@ fn normals(text: &mut Text, given: usize, k: usize, mixture: Option<&Mixture<f32
             "fn normals(key: vec2<u32>, index: vec2<u32>, stream: u32, attempt: u32{parameter}) -> Normals"
         ),
         |body| {
-            let word = |w: usize| format!("w{}.{}", w / 4, ["x", "y", "z", "w"][w % 4]);
             let words = mixture.map_or(k, |mixture| mixture.choice() + 1);
             for block in 0..words.div_ceil(4) {
                 body.line(&format!("let w{block} = philox(vec4(index, attempt, stream | {block}u), key);"));

@@ -1,6 +1,7 @@
 //! A cover's candidates as WGSL text.
 
 use super::proposal::choice;
+use super::writer::word;
 use crate::cover::BoxMixture;
 
 const TRUNCATED: &str = include_str!("../../shaders/truncated.wgsl");
@@ -12,7 +13,6 @@ impl BoxMixture<f32> {
     /// Needs the fragments that make random words and normals.
     pub(crate) fn text(&self, padded: usize) -> String {
         let k = self.components;
-        let word = |w: usize| format!("w{}.{}", w / 4, ["x", "y", "z", "w"][w % 4]);
         let blocks = (0..self.blocks())
             .map(|b| format!("    let w{b} = philox(vec4(index, attempt, stream | {b}u), key);\n"));
         let coordinates = (0..k).map(|j| format!("    let c{j} = coordinate(row, {j}u, {});\n", word(j + 1)));

@@ -2,11 +2,10 @@
 
 use super::proposal::choice;
 use super::shader::kept;
+use super::writer::PARTS;
 use crate::mixture::{Mixture, triangle};
 
 const LOOPED: &str = include_str!("../../shaders/mixture_looped.wgsl");
-
-const LETTERS: [&str; 4] = ["x", "y", "z", "w"];
 
 impl Mixture<f32> {
     /// `choose(word) -> u32`: the first row of the centre that a word chooses, in the table of [`words`](Self::words).
@@ -28,7 +27,7 @@ impl Mixture<f32> {
 
     /// Coordinate `j` of the candidate, where `normal` names each normal.
     pub(super) fn coordinate(&self, j: usize, normal: impl Fn(usize) -> String) -> String {
-        let number = |i: usize| format!("c{}.{}", i / 4, LETTERS[i % 4]);
+        let number = |i: usize| format!("c{}.{}", i / 4, PARTS[i % 4]);
         let k = self.components();
         let first = number(j);
         match self.has_factors() {
@@ -52,7 +51,7 @@ impl Mixture<f32> {
     /// The line that calls it, at the end of what makes normals in a loop.
     pub(super) fn call(&self) -> String {
         let word = self.choice();
-        let letter = LETTERS[word % 4];
+        let letter = PARTS[word % 4];
         let block = word / 4;
         format!("    place(&z, choose(philox(vec4(index, attempt, stream | {block}u), key).{letter}));\n")
     }

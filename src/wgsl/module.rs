@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use super::guards::{Zero, written};
 use super::shader::functions;
 use super::tables::Tables;
-use super::writer::{Text, float, list};
+use super::writer::{PARTS, Text, float, list};
 use super::{Arithmetic, Dialect, Form};
 use crate::dataset::SpectrumKind;
 use crate::grid::Grid;
@@ -200,7 +200,7 @@ fn draw(text: &mut Text, program: &Program, is_exact: bool) {
     let (attempts, given) = (program.max_attempts, program.given);
     let (kind, parts) = match given {
         0 | 1 => ("f32".to_owned(), "c".to_owned()),
-        2..=4 => (format!("vec{given}<f32>"), list(given, |i| format!("c.{}", ["x", "y", "z", "w"][i]))),
+        2..=4 => (format!("vec{given}<f32>"), list(given, |i| format!("c.{}", PARTS[i]))),
         _ => (format!("array<f32, {given}>"), list(given, |i| format!("c[{i}]"))),
     };
     let (name, condition, parameter, argument) = match given {

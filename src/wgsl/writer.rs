@@ -25,6 +25,14 @@ pub(super) fn float(value: f64) -> String {
     format!("{:?}f", value as f32)
 }
 
+/// Names of the parts of a vector.
+pub(super) const PARTS: [&str; 4] = ["x", "y", "z", "w"];
+
+/// A random word of an attempt, by its number from the first on, where the words of block b are the vector `wb`.
+pub(super) fn word(number: usize) -> String {
+    format!("w{}.{}", number / 4, PARTS[number % 4])
+}
+
 pub(super) fn list(count: usize, item: impl Fn(usize) -> String) -> String {
     (0..count).map(item).collect::<Vec<_>>().join(", ")
 }

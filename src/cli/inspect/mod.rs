@@ -20,6 +20,7 @@ mod comparison;
 use self::comparison::Compared;
 use super::options::RecipeArguments;
 use super::parse::number;
+use super::run::left_out;
 use super::wavelengths::grid;
 use super::{if_exists, picture};
 
@@ -188,7 +189,10 @@ fn table(
         line(&mut text, "basis", &said);
     }
     line(&mut text, "normalization", normalization(model.parts().normalization));
-    line(&mut text, "distribution", &distribution(model, recipe));
+    line(&mut text, "distribution", &model.distribution().to_string());
+    if let Some(left_out) = recipe.as_ref().ok().and_then(left_out) {
+        line(&mut text, "", &left_out);
+    }
     for (index, source) in model.parts().sources.iter().enumerate() {
         line(&mut text, if index == 0 { "sources" } else { "" }, source);
     }
@@ -230,20 +234,6 @@ fn normalization(normalization: Normalization) -> &'static str {
         Normalization::Mean => "each spectrum divided by its mean power",
         Normalization::Integral => "each spectrum divided by its integral over the grid",
         Normalization::None => "none",
-    }
-}
-
-/// Describes the distribution of the weights, and what of it is not drawn.
-fn distribution(model: &Model, recipe: &Result<Recipe, RecipeError>) -> String {
-    let said = model.distribution().to_string();
-    match recipe.as_ref().map_or(0, Recipe::left_out) {
-        0 => said,
-        left_out => format!(
-            "{said}, of which {} {} no share: fewer than 1 draw in 64 about {} would be accepted",
-            grouped(left_out as u64),
-            if left_out == 1 { "has" } else { "have" },
-            if left_out == 1 { "it" } else { "them" },
-        ),
     }
 }
 

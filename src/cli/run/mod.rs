@@ -11,7 +11,7 @@ use spectroll::output::SetStatus;
 use super::interrupt::{self, Interrupted};
 pub(super) use dry_run::{DryRun, folder_of};
 use progress::{Progress, Shown};
-pub(super) use summary::{above_one, doubts, drawn_by, kind, part, rechecked, room, status};
+pub(super) use summary::{above_one, doubts, drawn_by, kind, left_out, part, rechecked, room, status};
 pub(super) use waiting::Waiting;
 
 /// Draws the rows that are missing, shows how far that is, and completes the output.

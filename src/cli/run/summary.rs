@@ -3,7 +3,7 @@
 use spectroll::export::{Destination, Output, Space};
 use spectroll::output::{ByteCount, Schema, SetStatus, Shard};
 use spectroll::wording::{counted, grouped};
-use spectroll::{Distribution, Engine, Model, Recipe};
+use spectroll::{Engine, Model, Recipe};
 
 use super::folder_of;
 use crate::cli::folder;
@@ -43,21 +43,18 @@ pub(in crate::cli) fn rechecked(draws: u64) -> Option<String> {
 
 /// Sentences of a summary on a model that is not quite what was given, or not quite what its draws are.
 pub(in crate::cli) fn doubts(model: &Model) -> impl Iterator<Item = String> {
-    corrected_basis(model).into_iter().chain(impossible_mean(model)).chain(left_out(model))
+    corrected_basis(model).into_iter().chain(impossible_mean(model))
 }
 
 /// Says how many of a model's normal distributions are not drawn from, where some are not.
-fn left_out(model: &Model) -> Option<String> {
-    if *model.distribution() == Distribution::Gaussian {
-        return None;
-    }
-    let left_out = Recipe::builder(model).build().ok()?.left_out();
+pub(in crate::cli) fn left_out(recipe: &Recipe) -> Option<String> {
+    let left_out = recipe.left_out();
     (left_out > 0).then(|| {
-        let all = grouped(model.distribution().len() as u64);
+        let all = grouped(recipe.model().distribution().len() as u64);
         let (verb, them) = if left_out == 1 { ("has", "it") } else { ("have", "them") };
         format!(
             "of the model's {all} normal distributions {} {verb} no share: fewer than 1 draw in 64 about {them} would be \
-             physical",
+             accepted",
             grouped(left_out as u64)
         )
     })
