@@ -10,6 +10,7 @@ use engines::{cpu, kernel_surfaces, surfaces};
 use nalgebra::{DMatrix, DVector};
 use program::{fails, script, succeeds};
 use spectroll::evaluation::comparison::{Comparison, ComparisonFigures};
+use spectroll::scene::{LrvLevels, Scene, TargetConstraint, Targets};
 use spectroll::{
     Bounds, BuiltinTable, Dataset, Distribution, EngineError, Extrapolation, Fit, FitDistribution, Grid,
     MixtureComponent, Model, ModelError, ProposalKind, Quantity, Recipe, RecipeError, Sensors, SpectrumKind,
@@ -33,12 +34,15 @@ fn figures(model: &Model, data: &Dataset) -> ComparisonFigures {
 
 /// What is wanted of draws that are as varied as the data, and does not hold.
 fn unlike(figures: &ComparisonFigures) -> Vec<&'static str> {
-    let ratio = figures.determinant_ratio.expect("the data vary in all directions");
-    let p = figures.chromaticity_p_value.expect("the grid is visible");
+    let ratio = figures.drawn.determinant_ratio.expect("the data vary in all directions");
+    let p = figures.drawn.chromaticity_p_value.expect("the grid is visible");
     let wanted = [
-        ("means within 0.1 standard deviations", figures.weights.iter().all(|w| w.mean_shift.abs() < 0.1)),
+        (
+            "means within 0.1 standard deviations",
+            figures.weights.iter().all(|w| w.drawn.mean_shift.abs() < 0.1),
+        ),
         ("a determinant of 0.75 to 1.2 of the data's", (0.75..1.2).contains(&ratio)),
-        ("Kolmogorov-Smirnov distances below 0.1", figures.weights.iter().all(|w| w.distance < 0.1)),
+        ("Kolmogorov-Smirnov distances below 0.1", figures.weights.iter().all(|w| w.drawn.distance < 0.1)),
         ("chromaticities that an energy test does not tell apart", p > 0.01),
     ];
     wanted.into_iter().filter(|(_, holds)| !holds).map(|(name, _)| name).collect()
@@ -331,6 +335,18 @@ fn what_would_change_the_shares_is_refused() {
     assert!(kernel_surfaces().lrv(0.2..0.6).build().is_ok());
     // The same recipe of the Gaussian is drawn.
     assert!(surfaces().lrv(0.2..0.6).bounds(Bounds::Scaled).build().is_ok());
+    // So are the targets of scenes; levels that all scenes have are each a recipe of its own.
+    let scene = |model: &str, levels, bounds| {
+        let targets = Targets::new("walls", &builtin(model), TargetConstraint::Lrv(levels));
+        Scene::builder(10).group(targets.bounds(bounds)).build()
+    };
+    let kernel = "munsell-vrhel-kernel";
+    let own = LrvLevels::Uniform(0.2, 0.6);
+    let refused = scene(kernel, own.clone(), Bounds::Scaled).err().expect("it is refused").to_string();
+    assert!(refused.contains("walls") && refused.contains("a target of each draw's own"), "{refused}");
+    assert!(scene(kernel, own.clone(), Bounds::Base).is_ok());
+    assert!(scene(kernel, LrvLevels::Each(vec![0.2, 0.6]), Bounds::Scaled).is_ok());
+    assert!(scene("munsell-vrhel", own, Bounds::Scaled).is_ok());
 }
 
 /// A model file keeps its distribution, and one that is no distribution is refused with what is wrong.

@@ -209,7 +209,7 @@ fn draws_are_shown_beside_the_data() {
     let facts: serde_json::Value = serde_json::from_str(&text).unwrap();
     let comparison = &facts["comparison"];
     assert_eq!((&comparison["spectra"], &comparison["draws"]), (&632.into(), &20_000.into()));
-    let shift = comparison["weights"][0]["mean_shift"].as_f64().unwrap();
+    let shift = comparison["weights"][0]["drawn"]["mean_shift"].as_f64().unwrap();
     assert!((shift - 0.34).abs() < 0.03, "{shift}");
     let svg = std::fs::read_to_string(folder.path().join("beside.svg")).unwrap();
     assert!(svg.contains("munsell (462 spectra), vrhel (170 spectra) and 20,000 draws of seed 0"));

@@ -202,6 +202,16 @@ impl<R: Real> Kernel<R> {
         verdicts.accepted[0].then(|| (self.values(&candidates, status), status))
     }
 
+    /// The spectrum of the candidate of those words, before it is scaled and whether it is accepted or not: its bands, and
+    /// the last of them again up to a multiple of 4.
+    #[cfg(feature = "report")]
+    pub(crate) fn proposed(&self, mut block: impl FnMut(u32) -> [u32; 4]) -> Vec<R> {
+        let mut candidates = self.candidates::<1>();
+        self.propose(&mut candidates, &mut block);
+        self.spectrum.apply(&candidates.normals, &mut candidates.spectrum);
+        candidates.spectrum.into_flattened()
+    }
+
     /// Whether the candidate of those words is accepted.
     pub(crate) fn accepts(&self, block: impl FnMut(u32) -> [u32; 4]) -> bool {
         self.candidate(1, block).is_some()

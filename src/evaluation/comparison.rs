@@ -1,8 +1,9 @@
-//! Comparison of measured spectra with draws: the means, spreads, shapes and distributions of the weights of both, and
-//! their colours.
+//! Comparison of measured spectra with draws, and with the model's candidates before any is rejected: the means, spreads,
+//! shapes and distributions of the weights of each, and their colours.
 //!
 //! Rejection cuts a Gaussian that reaches far beyond the physical range, so draws do not have quite the distribution of
-//! the data. How far they are from it depends on the model and on the recipe.
+//! the data. How far they are from it depends on the model and on the recipe. What the candidates lack is due to the
+//! model, and what the draws lack beyond that to rejection.
 
 use nalgebra::DMatrix;
 use rand::Rng;
@@ -10,26 +11,35 @@ use serde::Serialize;
 
 use super::statistics::{kolmogorov, two_sample_distance};
 use crate::colorimetry;
+use crate::cpu::Kernel;
 use crate::dataset::{Dataset, SpectrumKind};
-use crate::model::{FitError, Model};
+use crate::model::{Distribution, FitError, Model};
+use crate::program::Program;
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
 use crate::threads;
 
-/// Measured spectra and draws of a recipe, on the grid of its model and normalised as it is.
+/// Measured spectra, candidates and draws of a recipe.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// The measured spectra, a column each.
-    pub measured: DMatrix<f64>,
-    /// The draws, a column each.
-    pub drawn: DMatrix<f64>,
-    /// Weights of the measured spectra, a column for each.
-    pub measured_weights: DMatrix<f64>,
-    /// Weights of the draws, a column for each.
-    pub drawn_weights: DMatrix<f64>,
+    /// The measured spectra.
+    pub measured: Sample,
+    /// The model's candidates, before any is rejected, scaled, or given a colour.
+    pub candidates: Sample,
+    /// The draws.
+    pub drawn: Sample,
     kind: SpectrumKind,
     /// Weights of the bands in X, Y and Z; `None` where the eye sees nothing of the grid.
     observer: Option<[Vec<f64>; 3]>,
+}
+
+/// Spectra on the grid of a model, and normalised as it is.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    /// The spectra, a column each.
+    pub spectra: DMatrix<f64>,
+    /// Their weights, a column for each.
+    pub weights: DMatrix<f64>,
 }
 
 /// Figures of a [`Comparison`].
@@ -37,43 +47,66 @@ pub struct Comparison {
 pub struct ComparisonFigures {
     /// Number of measured spectra.
     pub spectra: usize,
-    /// Number of draws.
+    /// Number of draws, and of candidates.
     pub draws: usize,
     /// Weight by weight.
     pub weights: Vec<WeightFigures>,
-    /// det(covariance of the weights of draws) / det(that of the measured spectra); `None` where the spectra do not
-    /// vary in as many directions as the model.
-    pub determinant_ratio: Option<f64>,
     /// CIE 1931 chromaticity x and y, and of reflectances the LRV: of reflectances under D65, of illuminants their own.
-    /// Empty where the eye sees nothing of the grid.
+    /// Empty where the eye sees nothing of the grid. A candidate has a chromaticity where its X, Y and Z are positive.
     pub colours: Vec<ColourFigures>,
-    /// Probability that chromaticities of one distribution are as far apart as those of the data and of the draws, by an
-    /// energy test of up to 632 of each; `None` where the eye sees nothing of the grid.
+    /// The candidates as a whole.
+    pub candidates: JointFigures,
+    /// The draws as a whole.
+    pub drawn: JointFigures,
+}
+
+/// Distribution of all weights and colours together, beside that of the data.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct JointFigures {
+    /// det(covariance of the weights) / det(that of the measured spectra); `None` where the spectra do not vary in as many
+    /// directions as the model.
+    pub determinant_ratio: Option<f64>,
+    /// Probability that chromaticities of one distribution are as far apart as these and those of the data, by an energy
+    /// test of up to 632 of each; `None` where the eye sees nothing of the grid.
     pub chromaticity_p_value: Option<f64>,
 }
 
-/// Distribution of one weight, in the data and in draws.
+/// Distribution of one weight.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct WeightFigures {
     /// Moments in the data.
     pub measured: Moments,
-    /// Moments in draws.
-    pub drawn: Moments,
-    /// Mean of draws less that of the data, in standard deviations of the data.
+    /// Candidates beside the data.
+    pub candidates: Departure,
+    /// Draws beside the data.
+    pub drawn: Departure,
+}
+
+/// Distribution of one weight beside that of the data.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Departure {
+    /// Moments of the weight.
+    #[serde(flatten)]
+    pub moments: Moments,
+    /// Its mean less that of the data, in standard deviations of the data.
     pub mean_shift: f64,
+    /// Its standard deviation over that of the data.
+    pub sd_ratio: f64,
     /// Largest distance of the two distribution functions (two-sample Kolmogorov-Smirnov).
     pub distance: f64,
     /// Probability of a distance as large between samples of one distribution.
     pub p_value: f64,
 }
 
-/// Distribution of a coordinate of colours, in the data and in draws.
+/// Distribution of a coordinate of colours.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ColourFigures {
     /// Name of the coordinate: `x`, `y` or `lrv`.
     pub name: &'static str,
     /// Moments in the data.
     pub measured: Moments,
+    /// Moments in candidates.
+    pub candidates: Moments,
     /// Moments in draws.
     pub drawn: Moments,
 }
@@ -90,8 +123,8 @@ pub struct Moments {
 }
 
 impl Comparison {
-    /// Compares `data`, on the grid of the recipe's model, with the first `draws` draws of a stream. Draws that found
-    /// no candidate are left out.
+    /// Compares `data`, on the grid of the recipe's model, with the first `draws` draws of a stream, and with the first
+    /// candidate of each. Draws that found no candidate are left out.
     ///
     /// # Panics
     /// Where the grid of the data is another.
@@ -102,14 +135,19 @@ impl Comparison {
         let (measured, _) = normalization.divide(data)?;
         let sampler = recipe.scalar_sampler::<f64>();
         // Only lights of an intensity have another divisor than 1 here.
-        let normalised = |index| {
-            let draw = sampler.draw(stream, index);
-            let spectrum = draw.spectrum();
+        let normalised = |spectrum: &[f64]| {
             let divisor = normalization.divisor(spectrum, model.grid());
-            (draw.status().attempts() > 0).then(|| spectrum.iter().map(|v| v / divisor).collect::<Vec<_>>())
+            spectrum.iter().map(|v| v / divisor).collect::<Vec<_>>()
         };
-        let drawn: Vec<f64> = (0..draws).filter_map(normalised).flatten().collect();
-        let drawn = DMatrix::from_vec(model.bands(), drawn.len() / model.bands(), drawn);
+        let drawn = |index| {
+            let draw = sampler.draw(stream, index);
+            (draw.status().attempts() > 0).then(|| normalised(draw.spectrum()))
+        };
+        let model_kernel = Kernel::<f64>::new(&unconditional(recipe));
+        let proposed = |index| {
+            let spectrum = model_kernel.proposed(|block| stream.block(index, 0, block));
+            normalised(&spectrum[..model.bands()])
+        };
         let observer = match model.kind() {
             SpectrumKind::Reflectance => colorimetry::xyz_weights(model.grid()),
             SpectrumKind::Illuminant => {
@@ -118,10 +156,9 @@ impl Comparison {
             }
         };
         Ok(Comparison {
-            measured_weights: weights(model, &measured),
-            drawn_weights: weights(model, &drawn),
-            measured,
-            drawn,
+            measured: Sample::new(model, measured),
+            candidates: Sample::of(model, (0..draws).map(proposed)),
+            drawn: Sample::of(model, (0..draws).filter_map(drawn)),
             kind: model.kind(),
             observer,
         })
@@ -129,51 +166,108 @@ impl Comparison {
 
     /// Computes the figures.
     pub fn figures(&self) -> ComparisonFigures {
-        let row = |of: &DMatrix<f64>, weight: usize| of.row(weight).iter().copied().collect::<Vec<_>>();
-        let weight = |i| WeightFigures::of(&row(&self.measured_weights, i), &row(&self.drawn_weights, i));
-        let ratio = determinant_ratio(&covariance(&self.drawn_weights), &covariance(&self.measured_weights));
+        let weight = |index| {
+            let [measured, candidates, drawn] =
+                [&self.measured, &self.candidates, &self.drawn].map(|sample| sample.weight(index));
+            WeightFigures {
+                measured: Moments::of(&measured),
+                candidates: Departure::of(&candidates, &measured),
+                drawn: Departure::of(&drawn, &measured),
+            }
+        };
         ComparisonFigures {
-            spectra: self.measured.ncols(),
-            draws: self.drawn.ncols(),
-            weights: (0..self.measured_weights.nrows()).map(weight).collect(),
-            determinant_ratio: Some(ratio).filter(|ratio| ratio.is_finite()),
+            spectra: self.measured.spectra.ncols(),
+            draws: self.drawn.spectra.ncols(),
+            weights: (0..self.measured.weights.nrows()).map(weight).collect(),
             colours: self.colours(),
-            chromaticity_p_value: self.observer.is_some().then(|| self.chromaticity_p_value()),
+            candidates: self.together(&self.candidates),
+            drawn: self.together(&self.drawn),
         }
     }
 
-    fn chromaticity_p_value(&self) -> f64 {
-        let of = |spectra| {
-            let all = self.coordinates(spectra);
+    fn together(&self, sample: &Sample) -> JointFigures {
+        let ratio = determinant_ratio(&covariance(&sample.weights), &covariance(&self.measured.weights));
+        let points = |sample| {
+            let all = self.chromaticities(sample);
             let stride = all.len().div_ceil(TESTED).max(1);
-            all.into_iter().step_by(stride).map(|[x, y, _]| [x, y]).collect::<Vec<_>>()
+            all.into_iter().step_by(stride).collect::<Vec<_>>()
         };
-        energy_p_value(&of(&self.measured), &of(&self.drawn))
+        JointFigures {
+            determinant_ratio: Some(ratio).filter(|ratio| ratio.is_finite()),
+            chromaticity_p_value: self
+                .observer
+                .is_some()
+                .then(|| energy_p_value(&points(&self.measured), &points(sample))),
+        }
     }
 
     fn colours(&self) -> Vec<ColourFigures> {
-        let (measured, drawn) = (self.coordinates(&self.measured), self.coordinates(&self.drawn));
+        let columns = |sample| {
+            let chromaticities = self.chromaticities(sample);
+            let column = |i: usize| chromaticities.iter().map(|xy| xy[i]).collect::<Vec<_>>();
+            [column(0), column(1), self.tristimulus(sample).map(|[_, y, _]| y).collect()]
+        };
+        let [measured, candidates, drawn] = [&self.measured, &self.candidates, &self.drawn].map(columns);
         let names: &[&str] = match self.kind {
             SpectrumKind::Reflectance => &["x", "y", "lrv"],
             SpectrumKind::Illuminant => &["x", "y"],
         };
-        let column = |of: &[[f64; 3]], i: usize| Moments::of(&of.iter().map(|c| c[i]).collect::<Vec<_>>());
         let coordinates = names.iter().enumerate().filter(|_| self.observer.is_some());
         coordinates
-            .map(|(i, name)| ColourFigures { name, measured: column(&measured, i), drawn: column(&drawn, i) })
+            .map(|(i, name)| ColourFigures {
+                name,
+                measured: Moments::of(&measured[i]),
+                candidates: Moments::of(&candidates[i]),
+                drawn: Moments::of(&drawn[i]),
+            })
             .collect()
     }
 
-    /// Chromaticity x and y and luminance Y of each of these spectra, a column each; empty where the eye sees nothing of
-    /// the grid.
-    pub fn coordinates(&self, spectra: &DMatrix<f64>) -> Vec<[f64; 3]> {
-        let Some(observer) = &self.observer else { return Vec::new() };
-        let of = |spectrum: nalgebra::DVectorView<f64>| {
-            let [x, y, z] =
-                observer.each_ref().map(|w| w.iter().zip(&spectrum).map(|(w, s)| w * s).sum::<f64>());
-            [x / (x + y + z), y / (x + y + z), y]
+    /// Chromaticity x and y of each spectrum that has one, which candidates need not have: X, Y and Z are positive. Empty
+    /// where the eye sees nothing of the grid.
+    pub fn chromaticities(&self, sample: &Sample) -> Vec<[f64; 2]> {
+        let chromaticity = |xyz: [f64; 3]| {
+            let sum: f64 = xyz.iter().sum();
+            xyz.iter().all(|&v| v > 0.0).then(|| [xyz[0] / sum, xyz[1] / sum])
         };
-        spectra.column_iter().map(of).collect()
+        self.tristimulus(sample).filter_map(chromaticity).collect()
+    }
+
+    fn tristimulus(&self, sample: &Sample) -> impl Iterator<Item = [f64; 3]> {
+        let of = |weights: &[Vec<f64>; 3], spectrum: nalgebra::DVectorView<f64>| {
+            weights.each_ref().map(|w| w.iter().zip(&spectrum).map(|(w, s)| w * s).sum())
+        };
+        self.observer
+            .iter()
+            .flat_map(move |weights| sample.spectra.column_iter().map(move |s| of(weights, s)))
+    }
+}
+
+/// The program of a model's own candidates, which those of a cover or of a colour are not.
+fn unconditional(recipe: &Recipe) -> Program {
+    let model = recipe.model();
+    match model.distribution() {
+        Distribution::Gaussian => Program::new(model, &model.weight_map(recipe.settings().covariance_scale)),
+        Distribution::Kernel { .. } | Distribution::Mixture(_) => recipe.program().clone(),
+    }
+}
+
+impl Sample {
+    fn new(model: &Model, spectra: DMatrix<f64>) -> Sample {
+        let parts = model.parts();
+        let mut weights = &parts.basis * &spectra;
+        let mean = &parts.basis * &parts.mean;
+        weights.column_iter_mut().for_each(|mut column| column -= &mean);
+        Sample { spectra, weights }
+    }
+
+    fn of(model: &Model, spectra: impl Iterator<Item = Vec<f64>>) -> Sample {
+        let values: Vec<f64> = spectra.flatten().collect();
+        Sample::new(model, DMatrix::from_vec(model.bands(), values.len() / model.bands(), values))
+    }
+
+    fn weight(&self, index: usize) -> Vec<f64> {
+        self.weights.row(index).iter().copied().collect()
     }
 }
 
@@ -215,15 +309,15 @@ fn energy_p_value(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     (1 + farther) as f64 / (1 + PERMUTATIONS) as f64
 }
 
-impl WeightFigures {
-    fn of(measured: &[f64], drawn: &[f64]) -> WeightFigures {
-        let (a, b) = (Moments::of(measured), Moments::of(drawn));
-        let distance = two_sample_distance(measured, drawn);
-        let (n, m) = (measured.len() as f64, drawn.len() as f64);
-        WeightFigures {
-            measured: a,
-            drawn: b,
-            mean_shift: (b.mean - a.mean) / a.sd,
+impl Departure {
+    fn of(weights: &[f64], measured: &[f64]) -> Departure {
+        let (moments, data) = (Moments::of(weights), Moments::of(measured));
+        let distance = two_sample_distance(measured, weights);
+        let (n, m) = (measured.len() as f64, weights.len() as f64);
+        Departure {
+            moments,
+            mean_shift: (moments.mean - data.mean) / data.sd,
+            sd_ratio: moments.sd / data.sd,
             distance,
             p_value: kolmogorov((n * m / (n + m)).sqrt() * distance),
         }
@@ -238,15 +332,6 @@ impl Moments {
         let sd = power(2).sqrt();
         Moments { mean, sd, skewness: if sd > 0.0 { power(3) / sd.powi(3) } else { 0.0 } }
     }
-}
-
-/// Weights of spectra, a column for each.
-fn weights(model: &Model, spectra: &DMatrix<f64>) -> DMatrix<f64> {
-    let parts = model.parts();
-    let mut weights = &parts.basis * spectra;
-    let mean = &parts.basis * &parts.mean;
-    weights.column_iter_mut().for_each(|mut column| column -= &mean);
-    weights
 }
 
 /// Covariance of columns, divided by their number.
@@ -284,9 +369,9 @@ mod tests {
         let figures = Comparison::new(&recipe, &data, Stream::new(0), 20_000).unwrap().figures();
         assert_eq!((figures.spectra, figures.draws), (632, 20_000));
         let first = figures.weights[0];
-        assert!((first.mean_shift.abs() - 0.34).abs() < 0.03, "{first:?}");
-        assert!((first.distance - 0.26).abs() < 0.02 && first.p_value < 1e-9, "{first:?}");
-        assert!((figures.determinant_ratio.unwrap() - 0.39).abs() < 0.03, "{figures:?}");
+        assert!((first.drawn.mean_shift.abs() - 0.34).abs() < 0.03, "{first:?}");
+        assert!((first.drawn.distance - 0.26).abs() < 0.02 && first.drawn.p_value < 1e-9, "{first:?}");
+        assert!((figures.drawn.determinant_ratio.unwrap() - 0.39).abs() < 0.03, "{figures:?}");
         assert_eq!(figures.colours.iter().map(|c| c.name).collect::<Vec<_>>(), ["x", "y", "lrv"]);
     }
 
@@ -316,9 +401,10 @@ mod tests {
         let figures = Comparison::new(&recipe, &data, Stream::new(0), 20_000).unwrap().figures();
         // Six weights at a false alarm rate of 1e-6 each; a mean has the standard error 0.0235, of which 5 are 0.12.
         for weight in &figures.weights {
-            assert!(weight.p_value > 1e-6 && weight.mean_shift.abs() < 0.12, "{weight:?}");
+            let drawn = weight.drawn;
+            assert!(drawn.p_value > 1e-6 && drawn.mean_shift.abs() < 0.12, "{weight:?}");
         }
-        assert!((figures.determinant_ratio.unwrap() - 1.0).abs() < 0.4, "{figures:?}");
+        assert!((figures.drawn.determinant_ratio.unwrap() - 1.0).abs() < 0.4, "{figures:?}");
     }
 
     #[test]
@@ -333,9 +419,10 @@ mod tests {
         let bright = Recipe::builder(&model).intensity(crate::Intensity::Fixed(100.0)).build().unwrap();
         let compare = |recipe| Comparison::new(recipe, &data, Stream::new(0), 50).unwrap();
         let (a, b) = (compare(&plain), compare(&bright));
-        assert!((&a.drawn - &b.drawn).amax() < 1e-12);
-        assert!(a.measured.column_iter().all(|s| (s.mean() - 1.0).abs() < 1e-12));
+        assert!((&a.drawn.spectra - &b.drawn.spectra).amax() < 1e-12);
+        assert!((&a.candidates.spectra - &b.candidates.spectra).amax() < 1e-12);
+        assert!(a.measured.spectra.column_iter().all(|s| (s.mean() - 1.0).abs() < 1e-12));
         // Three spectra do not vary in six directions.
-        assert_eq!(a.figures().determinant_ratio, None);
+        assert_eq!(a.figures().drawn.determinant_ratio, None);
     }
 }

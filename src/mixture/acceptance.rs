@@ -1,8 +1,8 @@
 //! Acceptance of the candidates about each centre, in f64.
 //!
-//! All centres share the same normals, so what a bound sees of them is made once: a centre's candidates are within a
-//! bound where `n . F z` is below the room that its centre leaves. With one spread for all that is a comparison of numbers
-//! that are there already, and most centres have few bounds near enough to need it.
+//! All centres share the same normals, so with one spread for all, what a bound sees of them is made once: a centre's
+//! candidates are within a bound where `n . F z` is below the room that its centre leaves. Those that are not are the first
+//! of the candidates in the order of what the bound sees, and sets of the first of them are made once as well.
 
 use super::{Centres, Spread, triangle};
 use crate::cover::HalfSpace;
@@ -26,8 +26,12 @@ pub(crate) fn acceptances(centres: &Centres, half_spaces: &[HalfSpace]) -> Vec<f
     let count = centres.shares.len();
     let each = (CANDIDATES / count).clamp(EACH[0], EACH[1]).next_power_of_two();
     let normals = normals(k, each);
-    let bounds: Vec<Bound> =
-        half_spaces.iter().map(|half_space| Bound::new(half_space, centres, &normals)).collect();
+    let bounds = match centres.spread {
+        Spread::Same(spread) => threads::map(half_spaces.len() as u64, 1, |number| {
+            Bound::new(&half_spaces[number as usize], spread, &normals)
+        }),
+        Spread::Own(_) => Vec::new(),
+    };
     let accepted = threads::map(count as u64, GRAIN, |centre| {
         accepted(centres, centre as usize, half_spaces, &bounds, &normals)
     });
@@ -60,19 +64,52 @@ fn normals(k: usize, each: usize) -> Vec<Vec<f64>> {
     coordinates
 }
 
-/// Products of a half-space and all normals, where all centres have the same spread; nothing elsewhere.
+/// Candidates in a word of a set.
+const WORD: usize = u64::BITS as usize;
+
+/// Candidates from one set of the first to the next.
+const STEP: usize = 16;
+
+/// A half-space as it sees the normals, where all centres have the same spread.
 struct Bound {
+    /// Products with the normals, falling.
     seen: Vec<f64>,
-    most: f64,
+    /// The candidate of each.
+    order: Vec<u32>,
+    /// For each multiple of [`STEP`] the set of as many candidates, the first in that order.
+    first: Vec<u64>,
 }
 
 impl Bound {
-    fn new(half_space: &HalfSpace, centres: &Centres, normals: &[Vec<f64>]) -> Bound {
-        let Spread::Same(spread) = centres.spread else { return Bound { seen: Vec::new(), most: 0.0 } };
+    fn new(half_space: &HalfSpace, spread: f64, normals: &[Vec<f64>]) -> Bound {
         let gains: Vec<f64> = half_space.normal.iter().map(|gain| spread * gain).collect();
         let seen = weighted(&gains, normals);
-        Bound { most: seen.iter().copied().fold(f64::NEG_INFINITY, f64::max), seen }
+        let mut order: Vec<u32> = (0..seen.len() as u32).collect();
+        order.sort_unstable_by(|&a, &b| seen[b as usize].total_cmp(&seen[a as usize]));
+        let mut set = vec![0; seen.len() / WORD];
+        let mut first = set.clone();
+        for candidates in order.chunks(STEP) {
+            candidates.iter().for_each(|&candidate| insert(&mut set, candidate));
+            first.extend(&set);
+        }
+        Bound { seen: order.iter().map(|&candidate| seen[candidate as usize]).collect(), order, first }
     }
+
+    /// Adds the candidates that are beyond this room.
+    fn reject(&self, room: f64, rejected: &mut [u64]) {
+        // Most centres are far from most bounds.
+        if self.seen[0] < room {
+            return;
+        }
+        let count = self.seen.partition_point(|&seen| seen >= room);
+        let first = &self.first[count / STEP * rejected.len()..];
+        rejected.iter_mut().zip(first).for_each(|(all, first)| *all |= first);
+        self.order[count - count % STEP..count].iter().for_each(|&candidate| insert(rejected, candidate));
+    }
+}
+
+fn insert(set: &mut [u64], candidate: u32) {
+    set[candidate as usize / WORD] |= 1 << (candidate as usize % WORD);
 }
 
 /// The sums of all normals' coordinates, times these gains.
@@ -94,27 +131,23 @@ fn accepted(
 ) -> usize {
     let k = centres.components;
     let coordinates = &centres.coordinates[centre * k..][..k];
-    let mut within = vec![true; normals[0].len()];
-    for (half_space, bound) in half_spaces.iter().zip(bounds) {
+    let mut rejected = vec![0; normals[0].len() / WORD];
+    for (number, half_space) in half_spaces.iter().enumerate() {
         let at_centre: f64 = half_space.normal.iter().zip(coordinates).map(|(gain, c)| gain * c).sum();
         let room = half_space.room - at_centre;
-        let own;
-        let (seen, most) = match &centres.spread {
-            Spread::Same(_) => (&bound.seen, bound.most),
+        match &centres.spread {
+            Spread::Same(_) => bounds[number].reject(room, &mut rejected),
             Spread::Own(factors) => {
-                own = weighted(
-                    &turned(&half_space.normal, &factors[centre * triangle(k)..][..triangle(k)]),
-                    normals,
-                );
-                (&own, f64::INFINITY)
+                let gains = turned(&half_space.normal, &factors[centre * triangle(k)..][..triangle(k)]);
+                let seen = weighted(&gains, normals);
+                for (set, seen) in rejected.iter_mut().zip(seen.chunks(WORD)) {
+                    let bit = |(bit, &seen): (usize, &f64)| u64::from(seen >= room) << bit;
+                    *set |= seen.iter().enumerate().map(bit).sum::<u64>();
+                }
             }
-        };
-        if most < room {
-            continue;
         }
-        within.iter_mut().zip(seen).for_each(|(within, seen)| *within &= *seen < room);
     }
-    within.into_iter().filter(|within| *within).count()
+    normals[0].len() - rejected.iter().map(|set| set.count_ones() as usize).sum::<usize>()
 }
 
 /// The gains of z in `normal . F z`.

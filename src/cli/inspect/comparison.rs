@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
-use spectroll::evaluation::comparison::{Comparison, ComparisonFigures, Moments};
+use spectroll::evaluation::comparison::{
+    ColourFigures, Comparison, ComparisonFigures, JointFigures, Moments, WeightFigures,
+};
 use spectroll::wording::grouped;
 use spectroll::{Dataset, Extrapolation, Model, Recipe, SpectrumKind, Stream, Table};
 
@@ -94,20 +96,24 @@ impl Compared {
     /// Describes in a sentence how far the draws are from the data.
     pub(super) fn sentence(&self) -> String {
         let weights = self.figures.weights.iter().enumerate();
-        let farthest = weights.clone().max_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+        let farthest = weights.max_by(|a, b| a.1.drawn.distance.total_cmp(&b.1.drawn.distance));
         let (at, weight) = farthest.expect("a model has components");
+        let JointFigures { determinant_ratio, chromaticity_p_value } = self.figures.drawn;
         let mut text = format!(
             "draws are farthest from the data in weight {}: its mean is off by {:.2} standard deviations, and the two \
              distributions are {:.3} apart (Kolmogorov-Smirnov)",
             at + 1,
-            weight.mean_shift.abs(),
-            weight.distance
+            weight.drawn.mean_shift.abs(),
+            weight.drawn.distance
         );
-        if let Some(ratio) = self.figures.determinant_ratio {
+        if let Some(ratio) = determinant_ratio {
             let _ =
                 write!(text, "; the determinant of their covariance is {:.1} % of the data's", 100.0 * ratio);
+            if let Some(before) = self.figures.candidates.determinant_ratio {
+                let _ = write!(text, ", and {:.1} % before rejection", 100.0 * before);
+            }
         }
-        if let Some(p) = self.figures.chromaticity_p_value {
+        if let Some(p) = chromaticity_p_value {
             let told = if p < 0.05 {
                 "tells their chromaticities apart"
             } else {
@@ -123,44 +129,46 @@ impl Compared {
         let mut text = String::new();
         let _ = writeln!(
             text,
-            "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}{:>9}",
-            "weight", "shift of", "ratio of", "skewness", "skewness", "Kolmogorov", "p"
+            "{:>6}{:>15}{:>14}{:>20}{:>14}{:>9}",
+            "weight", "shift of mean", "ratio of sds", "skewness", "Kolmogorov", "p"
         );
+        let _ = writeln!(text, "{:>6}{:>15}{:>48}", "", "in sds of data", "-Smirnov");
         let _ = writeln!(
             text,
-            "{:>9}{:>11}{:>11}{:>11}{:>11}{:>11}",
-            "", "mean, sd", "sds", "of data", "of draws", "-Smirnov"
+            "{:>6}{:>8}{:>7}{:>7}{:>7}{:>6}{:>7}{:>7}{:>7}{:>7}{:>9}",
+            "", "before", "draws", "before", "draws", "data", "before", "draws", "before", "draws", "draws"
         );
-        for (index, weight) in self.figures.weights.iter().enumerate() {
-            let _ = writeln!(
-                text,
-                "{:>9}{:>11.3}{:>11.3}{:>11.2}{:>11.2}{:>11.3}{:>9}",
-                index + 1,
-                unsigned_zero(weight.mean_shift, 3),
-                weight.drawn.sd / weight.measured.sd,
-                unsigned_zero(weight.measured.skewness, 2),
-                unsigned_zero(weight.drawn.skewness, 2),
-                weight.distance,
-                p_value(weight.p_value),
-            );
+        for (index, WeightFigures { measured, candidates, drawn }) in self.figures.weights.iter().enumerate()
+        {
+            let _ = write!(text, "{:>6}", index + 1);
+            let shifts = [candidates, drawn].map(|of| unsigned_zero(of.mean_shift, 3));
+            let skewnesses = [measured, &candidates.moments, &drawn.moments];
+            let skewnesses = skewnesses.map(|moments| unsigned_zero(moments.skewness, 2));
+            let _ = write!(text, "{:>8.3}{:>7.3}", shifts[0], shifts[1]);
+            let _ = write!(text, "{:>7.3}{:>7.3}", candidates.sd_ratio, drawn.sd_ratio);
+            let _ = write!(text, "{:>6.2}{:>7.2}{:>7.2}", skewnesses[0], skewnesses[1], skewnesses[2]);
+            let _ = write!(text, "{:>7.3}{:>7.3}", candidates.distance, drawn.distance);
+            let _ = writeln!(text, "{:>9}", p_value(drawn.p_value));
         }
         let under = match model.kind() {
             SpectrumKind::Reflectance => "under D65",
             SpectrumKind::Illuminant => "of the light",
         };
         if !self.figures.colours.is_empty() {
-            let _ = writeln!(text, "\n{:>9}{:>20}{:>20}   CIE 1931, {under}", "", "data", "draws");
-        }
-        for colour in &self.figures.colours {
-            let pair = |Moments { mean, sd, .. }: Moments| format!("{mean:.4} ± {sd:.4}");
             let _ = writeln!(
                 text,
-                "{:>9}{:>20}{:>20}",
-                if colour.name == "lrv" { "LRV" } else { colour.name },
-                pair(colour.measured),
-                pair(colour.drawn)
+                "\n{:>6}{:>17}{:>17}{:>17}   CIE 1931, {under}",
+                "", "data", "before", "draws"
             );
         }
+        for ColourFigures { name, measured, candidates, drawn } in &self.figures.colours {
+            let _ = write!(text, "{:>6}", if *name == "lrv" { "LRV" } else { name });
+            for Moments { mean, sd, .. } in [measured, candidates, drawn] {
+                let _ = write!(text, "{:>17}", format!("{mean:.4} ± {sd:.4}"));
+            }
+            text.push('\n');
+        }
+        text += "\nBefore: the model's candidates, before any is rejected.\n";
         text
     }
 }

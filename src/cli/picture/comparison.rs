@@ -1,19 +1,23 @@
-//! The picture of measured spectra beside draws, four panels: the range of both, their weights one by one and the
-//! first two together, and their chromaticities.
+//! The picture of measured spectra beside draws, four panels: the range of both and of the candidates before any is
+//! rejected, their weights one by one, and of data and draws the first two together, and the chromaticities.
 
 use std::sync::Arc;
 
+use kuva::plot::line::LineStyle;
 use kuva::prelude::{BandPlot, Layout, LinePlot, Plot, ScatterPlot, TickFormat};
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 use nalgebra::DMatrix;
 use spectroll::Model;
-use spectroll::evaluation::comparison::Comparison;
+use spectroll::evaluation::comparison::{Comparison, Sample};
 use spectroll::evaluation::plot::{self, Caption, TICK_SIZE, Theme};
 
 use super::panel::{self, Axes, MARGINS, PANEL, Panel, curve};
 
 /// The most weights that are shown one by one.
 const MAX_WEIGHTS: usize = 8;
+
+/// Dashes of the lines of candidates.
+const DASHES: &str = "4 3";
 
 /// The most points of a kind in a panel: beyond these they hide each other.
 const MAX_POINTS: usize = 1500;
@@ -48,22 +52,29 @@ impl Picture<'_> {
         drawing
     }
 
-    /// Colours of the data and of the draws.
-    fn colours(&self) -> [&'static str; 2] {
+    fn samples(&self) -> [&Sample; 3] {
+        [&self.comparison.measured, &self.comparison.drawn, &self.comparison.candidates]
+    }
+
+    /// Colours of the data, of the draws and of the candidates.
+    fn colours(&self) -> [&'static str; 3] {
         let [data, draws, ..] = self.theme.colours();
-        [data, draws]
+        [data, draws, self.theme.quiet()]
     }
 
     /// The key, at the right of a panel's title.
     fn key(&self, panel: usize) -> Vec<Primitive> {
         let (x, y) = panel::place(panel).corner;
-        let (right, y) = (x + PANEL.0 - MARGINS[1], y + 20.0);
-        let entry = |(index, name): (usize, &str)| {
-            let x = right - 126.0 + 64.0 * index as f64;
+        let (mut x, y) = (x + PANEL.0 - MARGINS[1], y + 20.0);
+        let entries =
+            [("data", 62.0, None), ("draws", 70.0, None), ("before rejection", 130.0, Some(DASHES))];
+        let shown = if panel < 2 { 3 } else { 2 };
+        let entry = |(index, (name, width, dashes)): (usize, (&str, f64, Option<&str>))| {
+            x -= width;
             let text = plot::text((x + 20.0, y + 4.0), TICK_SIZE, name, TextAnchor::Start, self.theme.ink());
-            [plot::mark((x, y), 14.0, self.colours()[index], 2.6, None), text]
+            [plot::mark((x, y), 14.0, self.colours()[index], 2.6, dashes), text]
         };
-        ["data", "draws"].into_iter().enumerate().flat_map(entry).collect()
+        entries[..shown].iter().copied().enumerate().rev().flat_map(entry).collect()
     }
 
     /// The middle nine tenths of the spectra, band by band, and their medians.
@@ -72,13 +83,20 @@ impl Picture<'_> {
         let axes = Axes { kind: self.model.kind(), grid: grid.clone(), theme: self.theme };
         let mut plots: Vec<Plot> = Vec::new();
         let mut shown = Vec::new();
-        for (spectra, colour) in
-            [&self.comparison.measured, &self.comparison.drawn].into_iter().zip(self.colours())
-        {
-            let bands: Vec<[f64; 5]> = spectra.row_iter().map(|row| quantiles(row.iter().copied())).collect();
+        for (index, (sample, colour)) in self.samples().into_iter().zip(self.colours()).enumerate() {
+            let rows = sample.spectra.row_iter();
+            let bands: Vec<[f64; 5]> = rows.map(|row| quantiles(row.iter().copied())).collect();
             let at = |share: usize| curve(grid, &bands.iter().map(|band| band[share]).collect::<Vec<_>>());
             let (low, middle, high) = (at(0), at(2), at(4));
             shown.extend(low.iter().chain(&high).map(|p| p.1));
+            if index == 2 {
+                let dashed = |points| {
+                    let line = LinePlot::new().with_data(points).with_color(colour).with_stroke_width(1.6);
+                    line.with_line_style(LineStyle::Custom(DASHES.to_owned())).into()
+                };
+                plots.extend([low, middle, high].map(dashed));
+                continue;
+            }
             let x = low.iter().map(|p| p.0);
             let band = BandPlot::new(x, low.iter().map(|p| p.1), high.iter().map(|p| p.1));
             plots.push(band.with_color(colour).with_opacity(0.2).into());
@@ -92,25 +110,23 @@ impl Picture<'_> {
         (plots, axes.values(axes.limits(shown.iter())), caption)
     }
 
-    /// The middle half and nine tenths of each weight, the data's above the draws'.
+    /// The middle half and nine tenths of each weight: the data's, the draws' below, and the candidates' at the bottom.
     fn weights(&self) -> Panel {
-        let measured = &self.comparison.measured_weights;
+        let measured = &self.comparison.measured.weights;
         let count = measured.nrows().min(MAX_WEIGHTS);
         let (mut plots, mut reach): (Vec<Plot>, f64) = (Vec::new(), 0.0);
         for weight in 0..count {
             let mean = measured.row(weight).mean();
             let sd = measured.row(weight).variance().sqrt();
-            for (of, (weights, colour)) in
-                [measured, &self.comparison.drawn_weights].into_iter().zip(self.colours()).enumerate()
-            {
-                let scaled = weights.row(weight).iter().map(|w| (w - mean) / sd).collect::<Vec<_>>();
+            for (of, (sample, colour)) in self.samples().into_iter().zip(self.colours()).enumerate() {
+                let scaled = sample.weights.row(weight).iter().map(|w| (w - mean) / sd).collect::<Vec<_>>();
                 let [low, left, middle, right, high] = quantiles(scaled.into_iter());
-                let y = (count - weight) as f64 + if of == 0 { 0.16 } else { -0.16 };
+                let y = (count - weight) as f64 + [0.25, 0.0, -0.25][of];
                 let line = |a: f64, b: f64, width: f64| {
                     LinePlot::new().with_data([(a, y), (b, y)]).with_color(colour).with_stroke_width(width)
                 };
                 plots.push(line(low, high, 1.6).into());
-                plots.push(line(left, right, 6.0).into());
+                plots.push(line(left, right, 5.0).into());
                 let dot = ScatterPlot::new().with_data([(middle, y)]).with_color(self.theme.ink());
                 plots.push(dot.with_size(2.6).into());
                 reach = reach.max(low.abs()).max(high.abs());
@@ -140,7 +156,7 @@ impl Picture<'_> {
             let second = weights.nrows().min(2) - 1;
             weights.column_iter().take(MAX_POINTS).map(|w| (w[0], w[second])).collect::<Vec<_>>()
         };
-        let points = [pairs(&self.comparison.measured_weights), pairs(&self.comparison.drawn_weights)];
+        let points = [&self.comparison.measured, &self.comparison.drawn].map(|sample| pairs(&sample.weights));
         let (plots, layout) = self.scatter(&points);
         let caption = Caption {
             title: "First two weights".to_owned(),
@@ -152,11 +168,11 @@ impl Picture<'_> {
 
     /// The chromaticity of each spectrum.
     fn chromaticities(&self) -> Panel {
-        let points = |spectra: &DMatrix<f64>| {
-            let coordinates = self.comparison.coordinates(spectra).into_iter();
-            coordinates.take(MAX_POINTS).map(|[x, y, _]| (x, y)).collect::<Vec<_>>()
+        let points = |sample: &Sample| {
+            let chromaticities = self.comparison.chromaticities(sample).into_iter();
+            chromaticities.take(MAX_POINTS).map(|[x, y]| (x, y)).collect::<Vec<_>>()
         };
-        let points = [points(&self.comparison.measured), points(&self.comparison.drawn)];
+        let points = [&self.comparison.measured, &self.comparison.drawn].map(points);
         let seen = !points[0].is_empty();
         let (plots, layout) = self.scatter(&points);
         let caption = Caption {

@@ -208,7 +208,7 @@ mod tests {
     fn builtin_models_are_held_beside_their_data() {
         let data = fidelity("granada", "granada").data.unwrap();
         assert_eq!((data.sources, data.figures.spectra, data.figures.draws), (vec!["granada"], 2600, 10_000));
-        assert!(data.figures.determinant_ratio.is_some());
+        assert!(data.figures.candidates.determinant_ratio.is_some());
         assert_eq!(data.figures.colours.len(), 2);
     }
 

@@ -10,6 +10,7 @@ use super::{
     StressRun,
 };
 use crate::dataset::SpectrumKind;
+use crate::evaluation::comparison::{Departure, WeightFigures};
 use crate::evaluation::stress::Outcome;
 use crate::random::normal::radius;
 use crate::wording::grouped;
@@ -206,39 +207,49 @@ pub(super) fn spreads(fidelity: &Fidelity, components: usize) -> String {
 /// Writes a table of draws beside the data.
 pub(super) fn data(fidelity: &Fidelity, kind: SpectrumKind) -> String {
     let Some(DataComparison { sources, figures }) = &fidelity.data else { return String::new() };
-    let weights = figures.weights.iter().enumerate().map(|(i, weight)| {
-        vec![
-            (i + 1).to_string(),
-            format!("{:.4}", weight.measured.sd),
-            format!("{:.3}", weight.mean_shift),
-            format!("{:.3}", weight.drawn.sd / weight.measured.sd),
-            format!("{:.2}", weight.measured.skewness),
-            format!("{:.2}", weight.drawn.skewness),
-            format!("{:.3}", weight.distance),
-            if weight.p_value < 1e-9 { "&lt; 10<sup>−9</sup>".to_owned() } else { number(weight.p_value) },
-        ]
-    });
-    let ratio = figures.determinant_ratio.map_or(String::new(), |ratio| {
-        format!(" The determinant of the covariance of draws is {:.1} % of the data’s.", 100.0 * ratio)
-    });
+    let weights =
+        figures.weights.iter().enumerate().flat_map(|(i, WeightFigures { measured, candidates, drawn })| {
+            let row = |name: &str, of: &Departure| {
+                vec![
+                    (i + 1).to_string(),
+                    name.to_owned(),
+                    format!("{:.3}", of.mean_shift),
+                    format!("{:.3}", of.sd_ratio),
+                    format!("{:.2}", measured.skewness),
+                    format!("{:.2}", of.moments.skewness),
+                    format!("{:.3}", of.distance),
+                    if of.p_value < 1e-9 { "&lt; 10<sup>−9</sup>".to_owned() } else { number(of.p_value) },
+                ]
+            };
+            [row("candidates", candidates), row("draws", drawn)]
+        });
+    let ratio = match [figures.candidates, figures.drawn].map(|figures| figures.determinant_ratio) {
+        [Some(candidates), Some(drawn)] => format!(
+            " The determinant of the covariance is {:.1} % of the data’s before rejection, and {:.1} % of draws.",
+            100.0 * candidates,
+            100.0 * drawn
+        ),
+        _ => String::new(),
+    };
     let html = table(
         &format!(
-            "Weights of {} accepted draws beside those of the {} spectra of the data ({}).{ratio}",
+            "Weights of {} draws, and of as many candidates before any is rejected, beside those of the {} spectra of the \
+             data ({}).{ratio}",
             grouped(figures.draws as u64),
             grouped(figures.spectra as u64),
             sources.join(", ")
         ),
         &[
             "weight",
-            "deviation of the data",
-            "shift of the mean, in it",
+            "of",
+            "shift of the mean, in standard deviations of the data",
             "deviation ÷ the data’s",
             "skewness of the data",
-            "skewness of draws",
+            "skewness",
             "Kolmogorov-Smirnov distance",
             "p",
         ],
-        1,
+        2,
         weights,
     );
     let under = match kind {
@@ -246,13 +257,18 @@ pub(super) fn data(fidelity: &Fidelity, kind: SpectrumKind) -> String {
         SpectrumKind::Illuminant => "of the lights",
     };
     let colours = figures.colours.iter().map(|colour| {
-        let [data, draws] =
-            [colour.measured, colour.drawn].map(|m| [m.mean, m.sd].map(|value| format!("{value:.4}")));
         let name = if colour.name == "lrv" { "LRV" } else { colour.name };
-        [vec![name.to_owned()], data.to_vec(), draws.to_vec()].concat()
+        let moments = [colour.measured, colour.candidates, colour.drawn].into_iter();
+        let values = moments.map(|m| format!("{:.4} ± {:.4}", m.mean, m.sd));
+        std::iter::once(name.to_owned()).chain(values).collect()
     });
-    let head = ["", "mean of the data", "deviation", "mean of draws", "deviation"];
-    html + &table(&format!("Chromaticity and luminous reflectance (CIE 1931), {under}."), &head, 1, colours)
+    let head = ["", "data", "candidates", "draws"];
+    html + &table(
+        &format!("Chromaticity and luminous reflectance (CIE 1931), {under}: means and standard deviations."),
+        &head,
+        1,
+        colours,
+    )
 }
 
 pub(super) fn randomness(report: &Report, randomness: &Randomness) -> String {
