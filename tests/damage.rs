@@ -5,9 +5,8 @@ mod program;
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
 
-use program::{PROGRAM, fails, files, signed, spectroll, succeeds, tree};
+use program::{PROGRAM, fails, files, signed, spectroll, succeeds, tree, wait_until};
 
 /// A run that takes far longer than the test, once it has made the chunk of this number.
 fn endless(folder: &Path, flags: &str, chunk: u32) -> Child {
@@ -15,13 +14,9 @@ fn endless(folder: &Path, flags: &str, chunk: u32) -> Child {
         format!("sample munsell-vrhel -n 3e9 --force-space --chunk 100000 --engine cpu -o a.zarr {flags}");
     let mut command = Command::new(PROGRAM);
     command.args(run.split_whitespace()).current_dir(folder).stderr(Stdio::piped());
-    let child = command.spawn().unwrap();
-    let waiting = Instant::now();
+    let mut child = command.spawn().unwrap();
     let chunk = folder.join(format!("a.zarr.partial/spectra/c.{chunk}.0"));
-    while !chunk.exists() {
-        assert!(waiting.elapsed() < Duration::from_secs(60));
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    wait_until(&mut child, || chunk.exists());
     child
 }
 

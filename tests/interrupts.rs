@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use program::{PROGRAM, files};
+use program::{PROGRAM, files, wait_until};
 
 /// In the middle of a large file: exit code 130, soon, and nothing left behind.
 #[test]
@@ -21,11 +21,7 @@ fn an_interrupt_leaves_nothing() {
     ] {
         let arguments = arguments.split_whitespace();
         let mut child = Command::new(PROGRAM).args(arguments).current_dir(folder.path()).spawn().unwrap();
-        let start = Instant::now();
-        while files(folder.path()).is_empty() {
-            assert!(start.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        wait_until(&mut child, || !files(folder.path()).is_empty());
         std::thread::sleep(Duration::from_millis(300));
         assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
         assert_eq!(child.wait().unwrap().code(), Some(130));

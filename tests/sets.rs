@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use program::{PROGRAM, fails, files, signed, spectroll, succeeds, tree};
+use program::{PROGRAM, fails, files, signed, spectroll, succeeds, tree, wait_until};
 use rand::RngExt;
 use spectroll::Stream;
 
@@ -70,16 +70,11 @@ fn killed_runs_go_on_to_the_same_bytes() {
 #[test]
 fn an_interrupt_keeps_what_is_finished() {
     let folder = tempfile::tempdir().unwrap();
-    let run = "sample munsell-vrhel -n 3e8 --engine cpu -o a.zarr";
+    let run = "sample munsell-vrhel -n 3e8 --force-space --engine cpu -o a.zarr";
     let mut command = Command::new(PROGRAM);
     command.args(run.split_whitespace()).current_dir(folder.path()).stderr(Stdio::piped());
-    let child = command.spawn().unwrap();
-    let chunk = folder.path().join("a.zarr.partial/spectra/c.1.0");
-    let waiting = Instant::now();
-    while !chunk.exists() {
-        assert!(waiting.elapsed() < Duration::from_secs(60));
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    let mut child = command.spawn().unwrap();
+    wait_until(&mut child, || folder.path().join("a.zarr.partial/spectra/c.1.0").exists());
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
     let err = String::from_utf8(output.stderr).unwrap();

@@ -4,8 +4,10 @@
 #![allow(dead_code)]
 
 use std::fs;
+use std::io::Read;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
+use std::time::Duration;
 
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_spectroll");
 
@@ -31,6 +33,18 @@ pub(crate) fn fails(folder: &Path, arguments: &str, code: i32, message: &str) {
     assert!(err.contains(message), "{arguments}: {err}");
     assert!(!err.contains("panicked"), "{arguments}: {err}");
     assert_eq!(files(folder), before, "{arguments} left something behind");
+}
+
+/// Waits until this has happened in a run that is to go on for longer, however slow the machine.
+pub(crate) fn wait_until(child: &mut Child, happened: impl Fn() -> bool) {
+    while !happened() {
+        if let Some(status) = child.try_wait().unwrap() {
+            let mut err = String::new();
+            child.stderr.take().map(|mut stderr| stderr.read_to_string(&mut err));
+            panic!("it ended too early, with {status}: {err}");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
 }
 
 pub(crate) fn files(folder: &Path) -> Vec<String> {
