@@ -9,6 +9,20 @@ const OPENED: [&str; 3] = ["/dev/stdin", "/dev/fd/", "/proc/self/fd/"];
 
 /// Reads a file of no more than `limit` bytes.
 pub(crate) fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let (file, length) = open(path, limit)?;
+    let mut bytes = Vec::new();
+    if let Some(length) = length {
+        bytes.try_reserve_exact(length as usize + 1)?; // a byte more, so that the end is seen without growing
+    }
+    file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > limit {
+        true => Err(too_large("more", limit)),
+        false => Ok(bytes),
+    }
+}
+
+/// Opens a file of no more than `limit` bytes; returns it with its length, which a pipe does not have.
+pub(crate) fn open(path: &Path, limit: u64) -> io::Result<(File, Option<u64>)> {
     let found = fs::metadata(path)?;
     if found.is_dir() {
         return Err(io::ErrorKind::IsADirectory.into());
@@ -16,24 +30,16 @@ pub(crate) fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     if !found.is_file() && !OPENED.iter().any(|opened| path.to_string_lossy().starts_with(opened)) {
         return Err(io::Error::other("it is a pipe or a device, and a plain file is needed"));
     }
-    let too_large = |bytes: &str| {
-        io::Error::new(
-            io::ErrorKind::FileTooLarge,
-            format!("it has {bytes} bytes, and no more than {limit} are read"),
-        )
-    };
-    if found.is_file() && found.len() > limit {
-        return Err(too_large(&found.len().to_string()));
+    let length = found.is_file().then(|| found.len());
+    match length {
+        Some(length) if length > limit => Err(too_large(&length.to_string(), limit)),
+        _ => Ok((File::open(path)?, length)),
     }
-    let mut bytes = Vec::new();
-    if found.is_file() {
-        bytes.try_reserve_exact(found.len() as usize + 1)?; // a byte more, so that the end is seen without growing
-    }
-    File::open(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
-    match bytes.len() as u64 > limit {
-        true => Err(too_large("more")),
-        false => Ok(bytes),
-    }
+}
+
+fn too_large(bytes: &str, limit: u64) -> io::Error {
+    let text = format!("it has {bytes} bytes, and no more than {limit} are read");
+    io::Error::new(io::ErrorKind::FileTooLarge, text)
 }
 
 /// Reads a text of no more than `limit` bytes, in UTF-8.

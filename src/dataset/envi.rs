@@ -1,9 +1,11 @@
 //! ENVI spectral libraries: numbers in one file (`.sli`), and a text beside it (`.hdr`) that says what they are.
 
 use std::collections::HashMap;
+use std::io::{Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::arrays::{Array, Arrays, Order};
+use super::files::Source;
 use super::numbers::{Number, NumberKind};
 use super::units::WavelengthUnit;
 use super::{DatasetError, MAX_VALUES, files, text, too_many};
@@ -18,12 +20,12 @@ pub(super) struct Header {
     data: PathBuf,
 }
 
-/// The header of a file, where it is one, or has one beside it and is no text of its own.
-pub(super) fn header(path: &Path, bytes: &[u8]) -> Result<Option<Header>, DatasetError> {
+/// The header of a file that begins so, where it is one, or has one beside it.
+pub(super) fn header(path: &Path, head: &[u8]) -> Result<Option<Header>, DatasetError> {
     let is_header = |bytes: &[u8]| {
         bytes.starts_with(b"ENVI\n") || bytes.starts_with(b"ENVI\r") || bytes.starts_with(b"ENVI ")
     };
-    if is_header(bytes) {
+    if is_header(head) {
         let stem = path.with_extension("");
         let beside = ["sli", "dat", "img", "bin"].into_iter().map(|extension| path.with_extension(extension));
         let data = beside.chain([stem]).find(|data| data.is_file() && data != path);
@@ -33,7 +35,8 @@ pub(super) fn header(path: &Path, bytes: &[u8]) -> Result<Option<Header>, Datase
                 "the file of numbers that it describes (.sli) is not beside it".to_owned(),
             ));
         };
-        return Ok(Some(Header { entries: entries(&text::decode(bytes).0), data }));
+        let bytes = files::read_capped(path, MAX_HEADER)?;
+        return Ok(Some(Header { entries: entries(&text::decode(&bytes).0), data }));
     }
     let named = PathBuf::from(format!("{}.hdr", path.display()));
     for beside in [path.with_extension("hdr"), named] {
@@ -98,23 +101,26 @@ pub(super) fn arrays(path: &Path, header: &Header) -> Result<Arrays, DatasetErro
         15 => (NumberKind::Unsigned, 8),
         other => return Err(wrong(format!("numbers of data type {other} are not real"))),
     };
-    let data = files::read(&header.data)?;
+    let mut data = Source::open(&header.data)?;
+    let length = data.length().map_err(|error| files::failed(&header.data, error))?;
     let count = bands.checked_mul(spectra);
     let size = count.and_then(|count| count.checked_mul(bytes));
-    let numbers = size.and_then(|size| data.get(offset..offset.checked_add(size)?));
-    let Some(numbers) = numbers else {
+    let end = size.and_then(|size| offset.checked_add(size));
+    let Some(count) = count.filter(|_| end.is_some_and(|end| end as u64 <= length)) else {
         return Err(wrong(format!(
             "its header promises {} of {}, and {:?} has {}",
             counted(spectra as u64, "spectrum", "spectra"),
             counted(bands as u64, "band", "bands"),
             header.data,
-            counted(data.len() as u64, "byte", "bytes")
+            counted(length, "byte", "bytes")
         )));
     };
-    if count.is_some_and(|count| count > MAX_VALUES) {
-        return Err(wrong(too_many(bands * spectra)));
+    if count > MAX_VALUES {
+        return Err(wrong(too_many(count)));
     }
-    let mut values = Number { kind, bytes, big_endian }.read_all(numbers);
+    let values = data.seek(SeekFrom::Start(offset as u64));
+    let values = values.and_then(|_| Number { kind, bytes, big_endian }.read_from(&mut data, count));
+    let mut values = values.map_err(|error| files::failed(&header.data, error))?;
     let mut notes = Vec::new();
     if let Some(factor) = entry("reflectance scale factor").and_then(|text| text.parse::<f64>().ok())
         && factor.is_finite()

@@ -1,7 +1,7 @@
 //! Files and folders as they are on disk, read within limits.
 
-use std::fs;
-use std::io::ErrorKind;
+use std::fs::{self, File};
+use std::io::{self, Cursor, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::{DatasetError, MAX_BYTES};
@@ -10,21 +10,102 @@ use crate::plain_file;
 /// Largest number of entries of a folder.
 const MAX_ENTRIES: usize = 200_000;
 
+/// Number of bytes that tell the type of a file.
+const HEAD: u64 = 8192;
+
+/// The contents of a file of data: some, and not too many. What is read in one pass is never in memory as a whole.
+pub(super) enum Source {
+    /// A file.
+    File(File),
+    /// Bytes in memory: the contents of a pipe, or those that a host has read.
+    Memory(Cursor<Vec<u8>>),
+}
+
+impl Source {
+    pub(super) fn open(path: &Path) -> Result<Source, DatasetError> {
+        let failed = |error| failed(path, error);
+        let source = match plain_file::open(path, MAX_BYTES).map_err(failed)? {
+            (file, Some(1..)) => Source::File(file),
+            // Files of the system that are made as they are read claim to be empty.
+            (_, None | Some(0)) => Source::of(plain_file::read(path, MAX_BYTES).map_err(failed)?),
+        };
+        match source {
+            Source::Memory(bytes) if bytes.get_ref().is_empty() => {
+                Err(DatasetError::Empty { path: path.to_owned() })
+            }
+            source => Ok(source),
+        }
+    }
+
+    pub(super) fn of(bytes: Vec<u8>) -> Source {
+        Source::Memory(Cursor::new(bytes))
+    }
+
+    /// Its first bytes, from which its type is told.
+    pub(super) fn head(&mut self) -> io::Result<Vec<u8>> {
+        let mut head = Vec::new();
+        self.by_ref().take(HEAD).read_to_end(&mut head)?;
+        self.rewind()?;
+        Ok(head)
+    }
+
+    /// Number of its bytes.
+    pub(super) fn length(&self) -> io::Result<u64> {
+        match self {
+            Source::File(file) => Ok(file.metadata()?.len()),
+            Source::Memory(bytes) => Ok(bytes.get_ref().len() as u64),
+        }
+    }
+
+    /// All of it, from the start.
+    pub(super) fn into_bytes(self) -> io::Result<Vec<u8>> {
+        match self {
+            Source::Memory(bytes) => Ok(bytes.into_inner()),
+            Source::File(mut file) => {
+                let mut bytes = Vec::new();
+                bytes.try_reserve_exact(file.metadata()?.len().min(MAX_BYTES) as usize + 1)?;
+                file.rewind()?;
+                file.take(MAX_BYTES).read_to_end(&mut bytes)?;
+                Ok(bytes)
+            }
+        }
+    }
+}
+
+impl Read for Source {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Source::File(file) => file.read(to),
+            Source::Memory(bytes) => bytes.read(to),
+        }
+    }
+}
+
+impl Seek for Source {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match self {
+            Source::File(file) => file.seek(to),
+            Source::Memory(bytes) => bytes.seek(to),
+        }
+    }
+}
+
 /// Bytes of a regular file, if they are at most `cap`.
 pub(super) fn read_capped(path: &Path, cap: u64) -> Result<Vec<u8>, DatasetError> {
-    plain_file::read(path, cap).map_err(|source| match source.kind() {
+    plain_file::read(path, cap).map_err(|error| failed(path, error))
+}
+
+/// The error of a file that cannot be read.
+pub(super) fn failed(path: &Path, source: io::Error) -> DatasetError {
+    match source.kind() {
         ErrorKind::FileTooLarge => DatasetError::TooLarge { path: path.to_owned() },
         _ => DatasetError::Read { path: path.to_owned(), source },
-    })
+    }
 }
 
 /// Bytes of a file of data: some, and not too many.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, DatasetError> {
-    let bytes = read_capped(path, MAX_BYTES)?;
-    if bytes.is_empty() {
-        return Err(DatasetError::Empty { path: path.to_owned() });
-    }
-    Ok(bytes)
+    Source::open(path)?.into_bytes().map_err(|error| failed(path, error))
 }
 
 /// Folders in a folder.

@@ -38,7 +38,6 @@ fn npy_parts(folder: &Path, parts: &[PathBuf], options: &ReadOptions) -> Result<
     let mut found = Arrays { format, order: Order::LastFirst, ..Arrays::default() };
     let mut count = 0;
     for path in parts {
-        let bytes = files::read(path)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let (name, is_part) = match stem.rsplit_once('-') {
             Some((name, number)) if number.len() == 6 && number.bytes().all(|b| b.is_ascii_digit()) => {
@@ -47,7 +46,7 @@ fn npy_parts(folder: &Path, parts: &[PathBuf], options: &ReadOptions) -> Result<
             _ => (stem, false),
         };
         let failed = |reason| DatasetError::Format { path: path.clone(), format: "a NumPy array", reason };
-        let array = npy::array(&name, &bytes).map_err(failed)?;
+        let array = npy::of_file(path, &name, files::Source::open(path)?)?;
         count += array.values.len();
         if count > MAX_VALUES {
             return Err(DatasetError::TooLarge { path: folder.to_owned() });

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::arrays::choose;
+use super::files::Source;
 use super::reading::{ReadOptions, Reading};
 use super::{DatasetError, envi, files, folder, hdf5_bytes, mat, npy, npz, spdx, text};
 
@@ -39,41 +40,45 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Reading, Datase
     if path.is_dir() {
         return folder::read(path, options);
     }
-    from_bytes(path, files::read(path)?, options)
+    read_source(path, Source::open(path)?, options)
 }
 
-/// Reads the bytes of a file; `path` is what messages call it, and where files are looked for that belong to it.
-pub(super) fn from_bytes(
+/// Reads the contents of a file; `path` is what messages call it, and where files are looked for that belong to it.
+pub(super) fn read_source(
     path: &Path,
-    bytes: Vec<u8>,
+    mut source: Source,
     options: &ReadOptions,
 ) -> Result<Reading, DatasetError> {
-    if is_hdf5(&bytes) {
-        return choose(path, hdf5_bytes(path, bytes)?, options);
+    let failed = |error| files::failed(path, error);
+    let head = source.head().map_err(failed)?;
+    let bytes = |source: Source| source.into_bytes().map_err(failed);
+    if is_hdf5(&head) {
+        return choose(path, hdf5_bytes(path, bytes(source)?)?, options);
     }
-    if npy::begins(&bytes) {
-        return choose(path, npy::arrays(path, &bytes)?, options);
+    if npy::begins(&head) {
+        return choose(path, npy::arrays(path, source)?, options);
     }
-    if bytes.starts_with(b"PAR1") {
-        return parquet(path, bytes, options);
+    if head.starts_with(b"PAR1") {
+        return parquet(path, bytes(source)?, options);
     }
-    if bytes.starts_with(b"PK") {
-        return match npz::kind(&bytes) {
-            npz::Archive::Npz => choose(path, npz::arrays(path, &bytes)?, options),
-            npz::Archive::Spreadsheet => spreadsheet(path, &bytes, options),
+    if head.starts_with(b"PK") {
+        return match npz::kind(&mut source) {
+            npz::Archive::Npz => choose(path, npz::arrays(path, source)?, options),
+            npz::Archive::Spreadsheet => spreadsheet(path, &bytes(source)?, options),
             npz::Archive::Other => Err(unknown(path, "an archive", "unpack it first")),
         };
     }
     // A workbook of before 2007.
-    if bytes.starts_with(b"\xd0\xcf\x11\xe0") {
-        return spreadsheet(path, &bytes, options);
+    if head.starts_with(b"\xd0\xcf\x11\xe0") {
+        return spreadsheet(path, &bytes(source)?, options);
     }
-    if let Some((_, found, advice)) = OTHERS.iter().find(|(start, ..)| bytes.starts_with(start)) {
+    if let Some((_, found, advice)) = OTHERS.iter().find(|(start, ..)| head.starts_with(start)) {
         return Err(unknown(path, found, advice));
     }
-    if let Some(header) = envi::header(path, &bytes)? {
+    if let Some(header) = envi::header(path, &head)? {
         return choose(path, envi::arrays(path, &header)?, options);
     }
+    let bytes = bytes(source)?;
     if mat::begins(&bytes) || bytes.starts_with(b"MATLAB") {
         return choose(path, mat::arrays(path, &bytes)?, options);
     }

@@ -3,11 +3,13 @@
 //! A header is a Python literal, and who writes it may be hostile: only what NumPy writes is understood, and nothing is
 //! allocated before the file is known to hold as many bytes as the header promises.
 
+use std::io::{self, Read};
 use std::path::Path;
 
-use super::DatasetError;
 use super::arrays::{Array, Arrays, Order};
+use super::files::Source;
 use super::numbers::{Number, transposed};
+use super::{DatasetError, files};
 
 /// Largest header that is read, in bytes; NumPy reads no longer one either, unless it is told to.
 const MAX_HEADER: usize = 10_000;
@@ -16,10 +18,9 @@ const MAX_HEADER: usize = 10_000;
 const MAX_SIDES: usize = 8;
 
 /// The array of a file, as the only one.
-pub(super) fn arrays(path: &Path, bytes: &[u8]) -> Result<Arrays, DatasetError> {
+pub(super) fn arrays(path: &Path, source: Source) -> Result<Arrays, DatasetError> {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    let failed = |reason| DatasetError::Format { path: path.to_owned(), format: "a NumPy array", reason };
-    let array = array(&name, bytes).map_err(failed)?;
+    let array = of_file(path, &name, source)?;
     Ok(Arrays {
         format: "NumPy array (.npy)".to_owned(),
         all: vec![array],
@@ -33,9 +34,19 @@ pub(super) fn begins(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x93NUMPY")
 }
 
-/// Reads an array.
-pub(super) fn array(name: &str, bytes: &[u8]) -> Result<Array, String> {
-    let (header, data) = Header::split(bytes)?;
+/// The array of a file, by this name.
+pub(super) fn of_file(path: &Path, name: &str, mut source: Source) -> Result<Array, DatasetError> {
+    let length = source.length().map_err(|error| files::failed(path, error))?;
+    array(name, &mut source, length).map_err(|reason| DatasetError::Format {
+        path: path.to_owned(),
+        format: "a NumPy array",
+        reason,
+    })
+}
+
+/// Reads an array from a source of as many bytes.
+pub(super) fn array(name: &str, source: &mut impl Read, length: u64) -> Result<Array, String> {
+    let header = Header::read(source)?;
     let number = Number::named(&header.dtype)
         .ok_or_else(|| format!("expected an array of numbers, found the type {}", header.dtype))?;
     if header.shape.is_empty() || header.shape.len() > MAX_SIDES {
@@ -43,19 +54,20 @@ pub(super) fn array(name: &str, bytes: &[u8]) -> Result<Array, String> {
     }
     let values = header.shape.iter().try_fold(1u64, |product, side| product.checked_mul(*side));
     let size = values.and_then(|values| usize::try_from(values).ok()?.checked_mul(number.bytes));
-    let Some(size) = size.filter(|size| *size <= data.len()) else {
+    let there = length.saturating_sub(header.bytes);
+    let Some(size) = size.filter(|size| *size as u64 <= there) else {
         let promised = size.map_or("more".to_owned(), |size| format!("{size} bytes"));
-        let found = data.len();
-        return Err(format!("its header promises {promised} of data, and {found} are there; copy it again"));
+        return Err(format!("its header promises {promised} of data, and {there} are there; copy it again"));
     };
-    if size / number.bytes > super::MAX_VALUES {
-        return Err(super::too_many(size / number.bytes));
+    let count = size / number.bytes;
+    if count > super::MAX_VALUES {
+        return Err(super::too_many(count));
     }
     let mut sides: Vec<usize> = header.shape.iter().map(|side| *side as usize).collect();
     if !header.fortran_order {
         sides.reverse();
     }
-    let values = number.read_all(&data[..size]);
+    let values = number.read_from(source, count).map_err(|error| cut(&error))?;
     match header.fortran_order {
         false => Ok(Array { name: name.to_owned(), sides, values, unit: None }),
         true => {
@@ -93,34 +105,52 @@ pub(super) fn turned(sides: &[usize], values: &[f64]) -> Vec<f64> {
     }
     out
 }
+
+/// The reason of a file that ends too early, or cannot be read on.
+fn cut(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => "it ends too early; copy it again".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
 /// Header of an array.
 #[derive(Debug, PartialEq)]
 struct Header {
     dtype: String,
     fortran_order: bool,
     shape: Vec<u64>,
+    /// Number of bytes before the data.
+    bytes: u64,
 }
 
 impl Header {
-    /// Reads the header of a file; returns it with the data after it.
-    fn split(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
-        let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or("it does not begin as a .npy file does")?;
-        let cut = "it ends within its header; copy it again";
-        let (length, rest) = match rest {
-            [1, _, a, b, rest @ ..] => (usize::from(u16::from_le_bytes([*a, *b])), rest),
-            [2 | 3, _, a, b, c, d, rest @ ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, rest),
-            [1..=3, ..] => return Err(cut.to_owned()),
+    /// Reads the header of a file, up to its data.
+    fn read(source: &mut impl Read) -> Result<Header, String> {
+        let mut take = |count: usize| {
+            let mut bytes = vec![0; count];
+            source.read_exact(&mut bytes).map(|()| bytes).map_err(|error| cut(&error))
+        };
+        let start = take(8)?;
+        if !begins(&start) {
+            return Err("it does not begin as a .npy file does".to_owned());
+        }
+        let width = match start[6] {
+            1 => 2,
+            2 | 3 => 4,
             _ => return Err("its version is none of 1, 2 and 3".to_owned()),
         };
+        let mut length = [0; 4];
+        length[..width].copy_from_slice(&take(width)?);
+        let length = u32::from_le_bytes(length) as usize;
         if length > MAX_HEADER {
             return Err(format!("its header has {length} bytes; {MAX_HEADER} is the most"));
         }
-        let (text, data) = rest.split_at_checked(length).ok_or(cut)?;
-        let text = std::str::from_utf8(text).map_err(|_| "its header is no text")?;
-        let header = Header::parse(text).ok_or_else(|| {
+        let text = String::from_utf8(take(length)?).map_err(|_| "its header is no text")?;
+        let header = Header::parse(&text).ok_or_else(|| {
             format!("its header is not NumPy's: {}", text.trim().chars().take(60).collect::<String>())
         })?;
-        Ok((header, data))
+        Ok(Header { bytes: (8 + width + length) as u64, ..header })
     }
 
     /// Parses `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 31), }`, in any order.
@@ -160,7 +190,7 @@ impl Header {
                 None => return None,
             };
         }
-        Some(Header { dtype: dtype?, fortran_order: fortran_order?, shape: shape? })
+        Some(Header { dtype: dtype?, fortran_order: fortran_order?, shape: shape?, bytes: 0 })
     }
 }
 
@@ -172,7 +202,8 @@ fn quoted(text: &str) -> Option<(&str, &str)> {
 
 /// Text of an array of one string, as NumPy holds it: four bytes a letter.
 pub(super) fn text(bytes: &[u8]) -> Option<String> {
-    let (header, data) = Header::split(bytes).ok()?;
+    let mut data = bytes;
+    let header = Header::read(&mut data).ok()?;
     let big_endian = match header.dtype.get(..2)? {
         "<U" => false,
         ">U" => true,

@@ -1,5 +1,7 @@
 //! Numbers as files hold them: floats and integers of every width, in both orders of their bytes.
 
+use std::io::{self, Read};
+
 use half::f16;
 
 /// Type of the numbers of an array.
@@ -75,17 +77,40 @@ impl Number {
 
     /// Reads all numbers of these bytes; an incomplete one at the end is left.
     pub(super) fn read_all(self, bytes: &[u8]) -> Vec<f64> {
+        let mut values = Vec::with_capacity(bytes.len() / self.bytes);
+        self.add(bytes, &mut values);
+        values
+    }
+
+    /// Reads as many numbers from a source, a part at a time: of a large file, memory that is new to the process costs
+    /// as much as the reading does.
+    pub(super) fn read_from(self, source: &mut impl Read, count: usize) -> io::Result<Vec<f64>> {
+        const PART: usize = 1 << 16;
+        let mut values = Vec::new();
+        values.try_reserve_exact(count)?;
+        let mut part = vec![0; PART.min(count * self.bytes)];
+        let mut left = count * self.bytes;
+        while left > 0 {
+            let part = &mut part[..PART.min(left)];
+            source.read_exact(part)?;
+            self.add(part, &mut values);
+            left -= part.len();
+        }
+        Ok(values)
+    }
+
+    fn add(self, bytes: &[u8], values: &mut Vec<f64>) {
         match (self.kind, self.bytes, self.big_endian) {
             (NumberKind::Float, 8, false) => {
-                bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect()
+                values.extend(bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)));
             }
             (NumberKind::Float, 4, false) => {
-                bytes.as_chunks().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect()
+                values.extend(bytes.as_chunks().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))));
             }
             (NumberKind::Unsigned, 2, false) => {
-                bytes.as_chunks().0.iter().map(|b| f64::from(u16::from_le_bytes(*b))).collect()
+                values.extend(bytes.as_chunks().0.iter().map(|b| f64::from(u16::from_le_bytes(*b))));
             }
-            _ => bytes.chunks_exact(self.bytes).map(|b| self.read(b)).collect(),
+            _ => values.extend(bytes.chunks_exact(self.bytes).map(|b| self.read(b))),
         }
     }
 }

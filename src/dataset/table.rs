@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
+use super::files::Source;
 use super::reading::{ReadOptions, Reading};
 use super::{DatasetError, MAX_BYTES, Remedy, SpectrumKind, axis, format};
 use crate::grid::{self, Grid};
@@ -137,7 +138,7 @@ impl Table {
         if bytes.len() as u64 > MAX_BYTES {
             return Err(DatasetError::TooLarge { path: path.to_owned() });
         }
-        Ok(Table::marked(path, format::from_bytes(path, bytes, options)?, options))
+        Ok(Table::marked(path, format::read_source(path, Source::of(bytes), options)?, options))
     }
 
     /// The reading of a file with its name in models, and with values marked as missing as asked for.
