@@ -16,7 +16,7 @@ demo:
 	target/release/spectroll inspect munsell-vrhel -o target/munsell-vrhel.png --force
 
 test: driver python
-	cargo test --locked --release
+	cargo test --locked --release --workspace --exclude spectroll-python
 
 # The tests that hold an adapter against the CPU, on a second software Vulkan with a compiler of its own. It draws slowly:
 # `make test-swiftshader SWIFTSHADER_TESTS="lists twins"` has the longest of them.
