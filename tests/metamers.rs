@@ -468,6 +468,45 @@ fn hard_and_unreachable_colours_have_their_answers() {
     );
 }
 
+/// Colours that are far from what any spectrum has are drawn once and known from then on; it shows in no answer.
+#[test]
+fn colours_that_came_up_before_have_the_same_answers() {
+    let mut colours = colours_of_draws(3000);
+    for (number, colour) in colours.chunks_exact_mut(3).enumerate() {
+        match number % 3 {
+            0 => colour.fill(1.0),
+            // Hard, or out of reach by little or by far.
+            1 => colour.copy_from_slice(&[0.93, 0.90, 0.05 + 0.01 * (number % 40) as f32]),
+            _ => {}
+        }
+    }
+    let recipe =
+        given().quantities([Quantity::Spectra, Quantity::Attempts]).max_attempts(200).build().unwrap();
+    for engine in [cpu(), gpu()] {
+        for unreachable in [UnreachableColours::Leave, UnreachableColours::Nearest] {
+            let metamers = Metamers::new(engine, &recipe).unwrap_or_else(|e| panic!("{engine}: {e}"));
+            let mut metamers = metamers.unreachable(unreachable);
+            let mut answers = || {
+                let (mut all, mut bytes) = (Vec::new(), Vec::new());
+                let counts = metamers.draw(Stream::new(3).draws(5..3005), &colours, |window| {
+                    assert_eq!(window.draws.first, 5 + all.len() as u64);
+                    all.extend_from_slice(window.answers);
+                    bytes.resize_with(window.formats().len(), Vec::new);
+                    bytes.iter_mut().zip(window.arrays()).for_each(|(all, some)| all.extend_from_slice(some));
+                    Ok::<_, MetamerError>(())
+                });
+                (all, bytes, counts.expect("every colour may be left or moved"))
+            };
+            let (first, second) = (answers(), answers());
+            assert!(first == second, "{engine}, {unreachable:?}");
+            assert_eq!(first.0.len(), 3000);
+            let kinds = |kind: fn(&Answer) -> bool| first.0.iter().filter(|answer| kind(answer)).count();
+            assert!(kinds(|answer| matches!(answer, Answer::Sampled { .. })) >= 1000);
+            assert!(kinds(|answer| matches!(answer, Answer::Nearest { .. } | Answer::Unreachable)) >= 1000);
+        }
+    }
+}
+
 /// The mode is smooth in the model's sense: no other spectrum of that colour is more probable, and drawn ones are less.
 #[test]
 fn no_draw_is_more_probable_than_the_mode() {
@@ -647,6 +686,8 @@ fn tables_of_colours_in_every_space() {
         ("metamers xyz.csv --per-pixel 2 -o e.npz", 2, "--per-pixel is for an image"),
         ("metamers xyz.csv --crop 0,0,1,1 -o e.npz", 2, "--crop is for an image"),
         ("metamers xyz.csv --space ss3 -o e.npz", 2, "did you mean \"ss2\"?"),
+        ("metamers xyz.csv --space labb -o e.npz", 2, "did you mean \"lab\"? there are xyz, srgb"),
+        ("metamers xyz.csv --space cones.tsv -o e.npz", 4, "cannot read"),
         ("metamers xyz.csv -k 3 -o e.npz", 2, "fit it with more components"),
         ("metamers xyz.csv --model granada-10nm -o e.npz", 2, "is neither a file nor a built-in model"),
     ] {

@@ -8,6 +8,7 @@ use serde::Serialize;
 use spectroll::evaluation::plot::PictureFormat;
 use spectroll::export::{ColourShape, Colours, MetamerExport, Output, Rows, Writing};
 use spectroll::output::SetStatus;
+use spectroll::suggestion::closest;
 use spectroll::wording::{counted, grouped};
 use spectroll::{
     AnswerCounts, ColourConversion, ColourSpace, Engine, Grid, HardColours, Illuminant, Model, Observer,
@@ -15,7 +16,9 @@ use spectroll::{
 };
 
 use super::exit::Usage;
-use super::options::{EngineArguments, IlluminantSource, OutputArguments, Purpose, illuminant, sensors};
+use super::options::{
+    EngineArguments, IlluminantSource, OutputArguments, Purpose, illuminant, looks_like_a_file, sensors,
+};
 use super::parse::{attempts, count, seed};
 use super::run::{self, Waiting};
 use super::wavelengths::grid;
@@ -250,10 +253,23 @@ fn given(arguments: &Arguments, grid: &Grid) -> anyhow::Result<(Sensors, ColourS
         arguments.space.as_deref().unwrap_or(if image::is_image(&arguments.source) { "srgb" } else { "xyz" });
     let observer =
         || Sensors::builtin(arguments.observer.name()).expect("every observer is a set of sensors");
-    match ColourSpace::NAMED.iter().find(|(known, _)| *known == name) {
-        Some((_, space)) if *space != ColourSpace::Responses => Ok((observer(), *space)),
-        _ => Ok((sensors(name, grid)?, ColourSpace::Responses)),
+    let spaces = || ColourSpace::NAMED.into_iter().filter(|(_, space)| *space != ColourSpace::Responses);
+    if let Some((_, space)) = spaces().find(|(known, _)| *known == name) {
+        return Ok((observer(), space));
     }
+    if Sensors::builtin(name).is_none() && !looks_like_a_file(name) {
+        let names: Vec<&str> = spaces().map(|(name, _)| name).collect();
+        let near = closest(name, names.iter().copied().chain(Sensors::BUILTIN));
+        let near = near.map_or_else(|| ";".to_owned(), |near| format!(", did you mean {near:?}?"));
+        return Err(Usage(format!(
+            "--space: {name:?} is no space of colours and no set of sensors{near} there are {} and {}; or name a file of \
+             sensors",
+            names.join(", "),
+            Sensors::BUILTIN.join(", ")
+        ))
+        .into());
+    }
+    Ok((sensors(name, grid)?, ColourSpace::Responses))
 }
 
 /// The colours, as responses of the sensors.

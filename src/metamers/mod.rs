@@ -19,7 +19,8 @@ pub use answer::{Answer, AnswerCounts, HardColours, MetamerError, UnreachableCol
 pub use colour::{ColourConversion, ColourSpace};
 
 use crate::affine::Affine;
-use crate::engine::{Batch, Engine, EngineError, Session};
+use crate::draw_status::DrawStatus;
+use crate::engine::{Engine, EngineError, Session};
 use crate::program::mode::mode;
 use crate::program::{Output, Program, Source, Unit, feasibility};
 use crate::quantity::{ArrayFormat, Dtype, Layout};
@@ -28,6 +29,13 @@ use crate::recipe::Recipe;
 
 /// Largest number of modes that are computed at once where nothing is drawn.
 const WINDOW: usize = 1 << 14;
+
+/// Numbers of draws, at first and at most, after which it is seen anew which colours are far.
+const PARTS: [u64; 2] = [1 << 14, 1 << 17];
+
+/// Distance, in units of the largest response to the model's mean, at which a colour is far from all that a spectrum has:
+/// hundreds of times what single precision rounds.
+const FAR: f64 = 1e-3;
 
 /// Draws of a recipe that gives each of them responses, on an engine, with an answer for every colour.
 ///
@@ -84,6 +92,8 @@ struct Best {
     answer: Answer,
     /// The colour and the normals; none where there is no spectrum.
     inputs: Option<Vec<f64>>,
+    /// Whether the colour is so far from all that a spectrum has that no rounding brings it near.
+    is_far: bool,
 }
 
 type Known = Mutex<HashMap<Vec<u32>, Best>>;
@@ -136,26 +146,108 @@ impl<'a> Metamers<'a> {
         mut sink: impl FnMut(MetamerWindow) -> Result<(), E>,
     ) -> Result<AnswerCounts, E> {
         let draws = draws.into();
-        let (first, width) = (draws.range.first, self.recipe.program().given);
+        let (count, width) = (draws.count(), self.recipe.program().given);
+        assert_eq!(colours.len() as u64, width as u64 * count, "{width} responses for each of {count} draws");
         let mut counts = AnswerCounts::default();
-        let answering = Answering {
+        let mut start = 0;
+        while start < count {
+            let part = draws.part(start, start.clamp(PARTS[0], PARTS[1]).min(count - start));
+            let colours = &colours[start as usize * width..][..part.count() as usize * width];
+            let near = self.near(colours);
+            counts += match near.len() as u64 == part.count() {
+                true => self.draw_all(part, colours, &mut sink)?,
+                false => self.draw_some(part, &near, colours, &mut sink)?,
+            };
+            start += part.count();
+        }
+        Ok(counts)
+    }
+
+    /// Numbers of the colours that are not known to be far from all that a spectrum has. No candidate of those is ever
+    /// accepted, so that looking for one takes all attempts; pictures are full of one such colour, as white paper is.
+    fn near(&self, colours: &[f32]) -> Vec<usize> {
+        let known = self.known.lock().expect("no holder panics");
+        let all = colours.chunks_exact(self.recipe.program().given).enumerate();
+        if known.values().all(|best| !best.is_far) {
+            return all.map(|(number, _)| number).collect();
+        }
+        let is_near = |colour: &[f32]| known.get(&bits(colour)).is_none_or(|best| !best.is_far);
+        all.filter(|(_, colour)| is_near(colour)).map(|(number, _)| number).collect()
+    }
+
+    fn answering(&self) -> Answering<'_> {
+        Answering {
             recipe: self.recipe,
             hard: self.hard,
             unreachable: self.unreachable,
             free: &self.free,
             known: &self.known,
-        };
-        let pool = &self.pool;
-        let formats = self.recipe.formats();
-        self.session.draw_given(draws, colours, |batch| -> Result<(), E> {
+        }
+    }
+
+    fn draw_all<E: From<EngineError> + From<MetamerError>>(
+        &mut self,
+        draws: Draws,
+        colours: &[f32],
+        sink: &mut impl FnMut(MetamerWindow) -> Result<(), E>,
+    ) -> Result<AnswerCounts, E> {
+        let (first, width) = (draws.range.first, self.recipe.program().given);
+        let mut counts = AnswerCounts::default();
+        let Metamers { recipe, hard, unreachable, free, known, pool, session } = self;
+        let answering = Answering { recipe, hard: *hard, unreachable: *unreachable, free, known };
+        let formats = recipe.formats();
+        session.draw_given(draws, colours, |batch| -> Result<(), E> {
             let start = batch.draws.first.wrapping_sub(first) as usize;
             let colours = &colours[start * width..][..batch.draws.count as usize * width];
-            let answered = pool.install(|| answering.window(&batch, colours, &formats));
-            counts.add(&answered.0);
-            answering.check(&answered.0, colours, |number| draws.index((start + number) as u64))?;
-            let (answers, arrays) = answered;
+            let arrays = formats.iter().map(|format| Cow::Borrowed(batch.bytes(format.quantity))).collect();
+            let (answers, arrays) =
+                pool.install(|| answering.window(batch.statuses(), arrays, colours, &formats));
+            counts.add(&answers);
+            answering.check(&answers, colours, |number| draws.index((start + number) as u64))?;
             sink(MetamerWindow { draws: batch.draws, answers: &answers, formats: &formats, arrays })
         })?;
+        Ok(counts)
+    }
+
+    /// Draws those of these numbers alone.
+    fn draw_some<E: From<EngineError> + From<MetamerError>>(
+        &mut self,
+        draws: Draws,
+        numbers: &[usize],
+        colours: &[f32],
+        sink: &mut impl FnMut(MetamerWindow) -> Result<(), E>,
+    ) -> Result<AnswerCounts, E> {
+        let (count, width) = (draws.count(), self.recipe.program().given);
+        let formats = self.recipe.formats();
+        let mut arrays: Vec<Vec<u8>> =
+            formats.iter().map(|format| vec![0; format.bytes(count) as usize]).collect();
+        let mut statuses = vec![DrawStatus::FAILED; count as usize];
+        let indices: Vec<u64> = numbers.iter().map(|&number| draws.index(number as u64)).collect();
+        let given: Vec<f32> =
+            numbers.iter().flat_map(|number| &colours[number * width..][..width]).copied().collect();
+        if !numbers.is_empty() {
+            self.session.draw_given(draws.range.stream.at(&indices), &given, |batch| -> Result<(), E> {
+                let numbers = &numbers[batch.draws.first as usize..][..batch.draws.count as usize];
+                for (&number, status) in numbers.iter().zip(batch.statuses()) {
+                    statuses[number] = *status;
+                }
+                for (format, array) in formats.iter().zip(&mut arrays) {
+                    let size = format.stride() * format.dtype.size();
+                    let rows = batch.bytes(format.quantity).chunks_exact(size);
+                    for (number, row) in numbers.iter().zip(rows) {
+                        array[number * size..][..size].copy_from_slice(row);
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        let answering = self.answering();
+        let arrays = arrays.into_iter().map(Cow::Owned).collect();
+        let (answers, arrays) = self.pool.install(|| answering.window(&statuses, arrays, colours, &formats));
+        answering.check(&answers, colours, |number| draws.index(number as u64))?;
+        sink(MetamerWindow { draws: draws.range, answers: &answers, formats: &formats, arrays })?;
+        let mut counts = AnswerCounts::default();
+        counts.add(&answers);
         Ok(counts)
     }
 
@@ -173,13 +265,7 @@ impl<'a> Metamers<'a> {
         assert!(colours.len().is_multiple_of(width), "{width} responses for each colour");
         let formats = self.recipe.formats();
         let mut counts = AnswerCounts::default();
-        let answering = Answering {
-            recipe: self.recipe,
-            hard: HardColours::Mode,
-            unreachable: self.unreachable,
-            free: &self.free,
-            known: &self.known,
-        };
+        let answering = Answering { hard: HardColours::Mode, ..self.answering() };
         for (number, window) in colours.chunks(WINDOW * width).enumerate() {
             let count = window.len() / width;
             let mut arrays: Vec<Cow<[u8]>> =
@@ -212,23 +298,21 @@ struct Answering<'a> {
 }
 
 impl Answering<'_> {
-    /// Answers and arrays of a batch: those that were drawn, and what stands in for the others.
+    /// Answers and arrays of some draws: those that were drawn, and what stands in for the others.
     fn window<'b>(
         &self,
-        batch: &Batch<'b>,
+        statuses: &[DrawStatus],
+        mut arrays: Vec<Cow<'b, [u8]>>,
         colours: &[f32],
         formats: &[ArrayFormat],
     ) -> (Vec<Answer>, Vec<Cow<'b, [u8]>>) {
-        let mut answers: Vec<Answer> = batch
-            .statuses()
+        let mut answers: Vec<Answer> = statuses
             .iter()
             .map(|status| match status.attempts() {
                 0 => Answer::Skipped,
                 attempts => Answer::Sampled { attempts },
             })
             .collect();
-        let mut arrays: Vec<Cow<[u8]>> =
-            formats.iter().map(|format| Cow::Borrowed(batch.bytes(format.quantity))).collect();
         let hard: Vec<usize> = (0..answers.len()).filter(|&i| answers[i] == Answer::Skipped).collect();
         if !hard.is_empty() {
             self.fill(&hard, colours, formats, &mut arrays, &mut answers);
@@ -268,7 +352,7 @@ impl Answering<'_> {
 
     /// The best spectrum of a colour.
     fn best(&self, colour: &[f32]) -> Best {
-        let bits: Vec<u32> = colour.iter().map(|value| value.to_bits()).collect();
+        let bits = bits(colour);
         if let Some(known) = self.known.lock().expect("no holder panics").get(&bits) {
             return known.clone();
         }
@@ -286,25 +370,28 @@ impl Answering<'_> {
         let program = self.recipe.program();
         let inputs = |colour: &[f64], normals: Vec<f64>| Some([colour.to_vec(), normals].concat());
         if let Some(normals) = mode(&program.at(colour)) {
-            return match self.hard {
-                HardColours::Mode => Best { answer: Answer::Mode, inputs: inputs(colour, normals) },
-                HardColours::Skip | HardColours::Error => Best { answer: Answer::Skipped, inputs: None },
+            let (answer, inputs) = match self.hard {
+                HardColours::Mode => (Answer::Mode, inputs(colour, normals)),
+                HardColours::Skip | HardColours::Error => (Answer::Skipped, None),
             };
+            return Best { answer, inputs, is_far: false };
         }
-        let nothing = Best { answer: Answer::Unreachable, inputs: None };
+        let nearest = feasibility::nearest(&self.free.0, &self.free.1, colour);
+        let mean = self.free.1.offset.iter().fold(0.0, |largest: f64, response| largest.max(response.abs()));
+        let is_far = nearest.as_ref().is_some_and(|nearest| distance(nearest, colour) > FAR * mean);
+        let nothing = Best { answer: Answer::Unreachable, inputs: None, is_far };
         if self.unreachable == UnreachableColours::Leave {
             return nothing;
         }
-        let Some((near, normals)) = self.nearest(colour) else { return nothing };
-        let distance = near.iter().zip(colour).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) as f32;
-        Best { answer: Answer::Nearest { distance }, inputs: inputs(&near, normals) }
+        let Some((near, normals)) = nearest.and_then(|nearest| self.within(&nearest)) else { return nothing };
+        let answer = Answer::Nearest { distance: distance(&near, colour) as f32 };
+        Best { answer, inputs: inputs(&near, normals), is_far }
     }
 
-    /// The nearest colour that a spectrum has, and the normals of its most probable one. The very nearest leave no room for
-    /// a spectrum, so this is as little of the way from there to the mean's as it takes.
-    fn nearest(&self, colour: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
-        let (program, responses) = self.free;
-        let (nearest, mean) = (feasibility::nearest(program, responses, colour)?, &responses.offset);
+    /// The colour that a spectrum has next to the nearest, and the normals of its most probable one. The very nearest leave
+    /// no room for a spectrum, so this is as little of the way from there to the mean's as it takes.
+    fn within(&self, nearest: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+        let mean = &self.free.1.offset;
         let steps = std::iter::once(0.0).chain((0..24).map(|doublings| 1e-6 * f64::from(1 << doublings)));
         steps.take_while(|&part| part < 1.0).find_map(|part| {
             let inwards: Vec<f64> =
@@ -334,6 +421,15 @@ impl Answering<'_> {
             _ => MetamerError::Hard { index, colour, attempts },
         })
     }
+}
+
+fn bits(colour: &[f32]) -> Vec<u32> {
+    colour.iter().map(|value| value.to_bits()).collect()
+}
+
+/// Largest difference of two colours in a response.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 /// The values of an output, of the colour and the normals.

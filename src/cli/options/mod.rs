@@ -12,4 +12,4 @@ pub(super) use data::DataArguments;
 pub(super) use engine::EngineArguments;
 pub(super) use output::{OutputArguments, Purpose};
 pub(super) use recipe::RecipeArguments;
-pub(super) use sensors::{IlluminantSource, illuminant, sensors};
+pub(super) use sensors::{IlluminantSource, illuminant, looks_like_a_file, sensors};

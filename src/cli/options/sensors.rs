@@ -99,7 +99,7 @@ impl TargetSource {
 }
 
 /// Whether a text that is no known name may be the name of a file.
-fn looks_like_a_file(text: &str) -> bool {
+pub(in crate::cli) fn looks_like_a_file(text: &str) -> bool {
     Path::new(text).exists() || text.contains(['.', '/', '\\', ':', '@'])
 }
 

@@ -126,7 +126,7 @@ impl Picture<'_> {
         let data = match self.gridded {
             Ok(data) => data,
             Err(_) => {
-                let layout = self.theme.axes((0.0, 1.0), (0.0, 1.0), MARGINS);
+                let layout = self.theme.blank(MARGINS);
                 let caption = Caption { title: "No model can be fitted".to_owned(), ..Caption::default() };
                 return (vec![LinePlot::new().into()], layout, caption);
             }

@@ -93,12 +93,21 @@ impl Theme {
 
     /// Axes with exactly these limits. `margins` are left for text on the left, right, top and bottom.
     pub fn axes(self, x: (f64, f64), y: (f64, f64), margins: [f64; 4]) -> Layout {
+        self.layout([x, y], margins, self.ink(), self.pale())
+    }
+
+    /// A ground of the same size without axes, for words.
+    pub fn blank(self, margins: [f64; 4]) -> Layout {
+        self.layout([(0.0, 1.0); 2], margins, self.ground(), self.ground())
+    }
+
+    fn layout(self, [x, y]: [(f64, f64); 2], margins: [f64; 4], ink: &str, grid: &str) -> Layout {
         let theme = kuva::prelude::Theme {
             background: self.ground().into(),
-            axis_color: self.ink().into(),
-            tick_color: self.ink().into(),
-            text_color: self.ink().into(),
-            grid_color: self.pale().into(),
+            axis_color: ink.into(),
+            tick_color: ink.into(),
+            text_color: ink.into(),
+            grid_color: grid.into(),
             legend_border: "none".into(),
             ..kuva::prelude::Theme::light()
         };
