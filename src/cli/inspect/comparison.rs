@@ -98,13 +98,16 @@ impl Compared {
         let weights = self.figures.weights.iter().enumerate();
         let farthest = weights.max_by(|a, b| a.1.drawn.distance.total_cmp(&b.1.drawn.distance));
         let (at, weight) = farthest.expect("a model has components");
-        let JointFigures { determinant_ratio, chromaticity_p_value } = self.figures.drawn;
+        let JointFigures { mean_spectrum_shift, determinant_ratio, chromaticity_p_value } =
+            self.figures.drawn;
         let mut text = format!(
             "draws are farthest from the data in weight {}: its mean is off by {:.2} standard deviations, and the two \
-             distributions are {:.3} apart (Kolmogorov-Smirnov)",
+             distributions are {:.3} apart (Kolmogorov-Smirnov); their mean spectrum is off by {:.3} at {} nm",
             at + 1,
             weight.drawn.mean_shift.abs(),
-            weight.drawn.distance
+            weight.drawn.distance,
+            mean_spectrum_shift.0.abs(),
+            mean_spectrum_shift.1
         );
         if let Some(ratio) = determinant_ratio {
             let _ =

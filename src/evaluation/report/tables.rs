@@ -223,6 +223,7 @@ pub(super) fn data(fidelity: &Fidelity, kind: SpectrumKind) -> String {
             };
             [row("candidates", candidates), row("draws", drawn)]
         });
+    let (shift, nm) = figures.drawn.mean_spectrum_shift;
     let ratio = match [figures.candidates, figures.drawn].map(|figures| figures.determinant_ratio) {
         [Some(candidates), Some(drawn)] => format!(
             " The determinant of the covariance is {:.1} % of the data’s before rejection, and {:.1} % of draws.",
@@ -234,10 +235,11 @@ pub(super) fn data(fidelity: &Fidelity, kind: SpectrumKind) -> String {
     let html = table(
         &format!(
             "Weights of {} draws, and of as many candidates before any is rejected, beside those of the {} spectra of the \
-             data ({}).{ratio}",
+             data ({}). The mean spectrum of draws is off by {:.3} at {nm} nm.{ratio}",
             grouped(figures.draws as u64),
             grouped(figures.spectra as u64),
-            sources.join(", ")
+            sources.join(", "),
+            shift.abs()
         ),
         &[
             "weight",
