@@ -30,7 +30,7 @@ pub(crate) fn open(path: &Path, limit: u64) -> io::Result<(File, Option<u64>)> {
     if !found.is_file() && !OPENED.iter().any(|opened| path.to_string_lossy().starts_with(opened)) {
         return Err(io::Error::other("it is a pipe or a device, and a plain file is needed"));
     }
-    let length = found.is_file().then(|| found.len());
+    let length = found.is_file().then_some(found.len());
     match length {
         Some(length) if length > limit => Err(too_large(&length.to_string(), limit)),
         _ => Ok((File::open(path)?, length)),

@@ -130,17 +130,8 @@ fn checks(
         for (index, target) in bench.targets.iter().enumerate() {
             let Some(engine) = target.engine() else { continue };
             bench.agenda.say(&format!("the distribution of {} on {}", scenario.name, target.facts.name))?;
-            let failed = std::cell::RefCell::new(None);
-            let sampler = |stream, first, count| {
-                Sample::of_engine(&scenario, engine, stream, first, count).unwrap_or_else(|e| {
-                    failed.borrow_mut().get_or_insert(e);
-                    oracle.clone()
-                })
-            };
-            let findings = battery(&sampler, &oracle, bench.seed);
-            if let Some(e) = failed.take() {
-                return Err(e.into());
-            }
+            let sampler = |stream, first, count| Sample::of_engine(&scenario, engine, stream, first, count);
+            let findings = battery(&sampler, &oracle, bench.seed)?;
             smallest.get_or_insert_with(|| smallest_errors(&oracle));
             // A model may reject some candidates even so, and then its weights are not normal.
             let normal = oracle.attempts.iter().all(|&attempts| attempts == 1.0);

@@ -65,15 +65,19 @@ impl Finding {
 }
 
 /// Function that draws a sample: from a stream, a first index and a number of draws.
-pub type SampleFn<'s, 'a> = &'s dyn Fn(Stream, u64, u64) -> Sample<'a>;
+pub type SampleFn<'s, 'a, E> = &'s dyn Fn(Stream, u64, u64) -> Result<Sample<'a>, E>;
 
 /// Runs every check that suits the scenario of `oracle` on as many draws of `sampler` as the oracle has, of streams
-/// under `seed`.
-pub fn battery(sampler: SampleFn, oracle: &Sample, seed: u64) -> Vec<(&'static Check, Finding)> {
+/// under `seed`. The only errors are those of the sampler.
+pub fn battery<E>(
+    sampler: SampleFn<E>,
+    oracle: &Sample,
+    seed: u64,
+) -> Result<Vec<(&'static Check, Finding)>, E> {
     let (stream, count) = (Stream::named(seed, "sample"), oracle.len() as u64);
-    let sample = sampler(stream, 0, count);
-    let other = sampler(Stream::named(seed, "other"), 0, count);
-    let far = sampler(stream, 1 << 32, count);
+    let sample = sampler(stream, 0, count)?;
+    let other = sampler(Stream::named(seed, "other"), 0, count)?;
+    let far = sampler(stream, 1 << 32, count)?;
     let library = Sample::of_library(oracle.scenario, stream, 0, KNOWN.min(count));
     let gaussian = oracle.scenario.is_untruncated().then_some(&GAUSSIAN);
     let run = |check: &'static Check| {
@@ -85,5 +89,5 @@ pub fn battery(sampler: SampleFn, oracle: &Sample, seed: u64) -> Vec<(&'static C
         };
         (check, check.run(&sample, reference))
     };
-    CHECKS.iter().chain(gaussian).map(run).collect()
+    Ok(CHECKS.iter().chain(gaussian).map(run).collect())
 }
