@@ -79,7 +79,7 @@ pub fn battery<E>(
     let other = sampler(Stream::named(seed, "other"), 0, count)?;
     let far = sampler(stream, 1 << 32, count)?;
     let library = Sample::of_library(oracle.scenario, stream, 0, KNOWN.min(count));
-    let gaussian = oracle.scenario.is_untruncated().then_some(&GAUSSIAN);
+    let gaussian = oracle.scenario.is_gaussian().then_some(&GAUSSIAN);
     let run = |check: &'static Check| {
         let reference = match check.against {
             Against::Oracle => oracle,

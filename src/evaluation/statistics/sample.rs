@@ -7,7 +7,7 @@ use crate::dataset::{BuiltinTable, Dataset, SpectrumKind};
 use crate::draw_status::DrawStatus;
 use crate::engine::{Batch, Engine, EngineError};
 use crate::grid::{Extrapolation, Grid};
-use crate::model::{Fit, FitDistribution, Model};
+use crate::model::{Distribution, Fit, FitDistribution, Model};
 use crate::program::Bounds;
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
@@ -70,9 +70,9 @@ impl Scenario {
         recipe
     }
 
-    /// Whether no candidate is rejected.
-    pub fn is_untruncated(&self) -> bool {
-        self.scale == UNTRUNCATED
+    /// Whether weights are those of a Gaussian: the model is one, and no candidate is rejected.
+    pub fn is_gaussian(&self) -> bool {
+        self.scale == UNTRUNCATED && *self.model.distribution() == Distribution::Gaussian
     }
 
     /// Upper limit of every value of an output.
