@@ -10,6 +10,11 @@ const OPENED: [&str; 3] = ["/dev/stdin", "/dev/fd/", "/proc/self/fd/"];
 /// Reads a file of no more than `limit` bytes.
 pub(crate) fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let (file, length) = open(path, limit)?;
+    read_all(file, length, limit)
+}
+
+/// Reads an open file of no more than `limit` bytes to its end; its length is what it has, where that is known.
+pub(crate) fn read_all(file: File, length: Option<u64>, limit: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     if let Some(length) = length {
         bytes.try_reserve_exact(length as usize + 1)?; // a byte more, so that the end is seen without growing

@@ -24,16 +24,13 @@ pub(super) enum Source {
 impl Source {
     pub(super) fn open(path: &Path) -> Result<Source, DatasetError> {
         let failed = |error| failed(path, error);
-        let source = match plain_file::open(path, MAX_BYTES).map_err(failed)? {
-            (file, Some(1..)) => Source::File(file),
+        match plain_file::open(path, MAX_BYTES).map_err(failed)? {
+            (file, Some(1..)) => Ok(Source::File(file)),
             // Files of the system that are made as they are read claim to be empty.
-            (_, None | Some(0)) => Source::of(plain_file::read(path, MAX_BYTES).map_err(failed)?),
-        };
-        match source {
-            Source::Memory(bytes) if bytes.get_ref().is_empty() => {
-                Err(DatasetError::Empty { path: path.to_owned() })
-            }
-            source => Ok(source),
+            (file, length) => match plain_file::read_all(file, length, MAX_BYTES).map_err(failed)? {
+                bytes if bytes.is_empty() => Err(DatasetError::Empty { path: path.to_owned() }),
+                bytes => Ok(Source::of(bytes)),
+            },
         }
     }
 
@@ -58,16 +55,12 @@ impl Source {
     }
 
     /// All of it, from the start.
-    pub(super) fn into_bytes(self) -> io::Result<Vec<u8>> {
+    pub(super) fn into_bytes(mut self) -> io::Result<Vec<u8>> {
+        self.rewind()?;
+        let length = self.length()?;
         match self {
             Source::Memory(bytes) => Ok(bytes.into_inner()),
-            Source::File(mut file) => {
-                let mut bytes = Vec::new();
-                bytes.try_reserve_exact(file.metadata()?.len().min(MAX_BYTES) as usize + 1)?;
-                file.rewind()?;
-                file.take(MAX_BYTES).read_to_end(&mut bytes)?;
-                Ok(bytes)
-            }
+            Source::File(file) => plain_file::read_all(file, Some(length.min(MAX_BYTES)), MAX_BYTES),
         }
     }
 }

@@ -8,7 +8,7 @@ mod answer;
 mod colour;
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
 use half::f16;
@@ -53,15 +53,9 @@ const FAR: f64 = 1e-3;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Metamers<'a> {
-    recipe: &'a Recipe,
     session: Session<'a>,
-    hard: HardColours,
-    unreachable: UnreachableColours,
     pool: Arc<ThreadPool>,
-    /// The model's own Gaussian, without responses given, and the map of the responses.
-    free: (Program, Affine),
-    /// The most probable spectra of colours that came up before, by their bits.
-    known: Known,
+    answering: Answering<'a>,
 }
 
 /// Some draws, with all quantities of the recipe.
@@ -92,11 +86,15 @@ struct Best {
     answer: Answer,
     /// The colour and the normals; none where there is no spectrum.
     inputs: Option<Vec<f64>>,
-    /// Whether the colour is so far from all that a spectrum has that no rounding brings it near.
-    is_far: bool,
 }
 
-type Known = Mutex<HashMap<Vec<u32>, Best>>;
+/// Colours that came up before, by their bits.
+#[derive(Default)]
+struct Known {
+    best: HashMap<Vec<u32>, Best>,
+    /// Those that are so far from all that a spectrum has that no rounding brings them near.
+    far: HashSet<Vec<u32>>,
+}
 
 impl<'a> Metamers<'a> {
     /// Prepares to draw from a recipe that [gives](crate::RecipeBuilder::given) each draw responses.
@@ -107,31 +105,30 @@ impl<'a> Metamers<'a> {
         assert!(recipe.program().given > 0, "the recipe gives draws no responses");
         let rows = recipe.formats().iter().all(|format| format.layout == Layout::Rows);
         assert!(rows, "metamers come in rows");
-        Ok(Metamers {
+        let answering = Answering {
             recipe,
-            session: engine.session(recipe)?,
             hard: HardColours::default(),
             unreachable: UnreachableColours::default(),
-            pool: engine.pool()?,
             free: recipe.free(),
             known: Mutex::default(),
-        })
+        };
+        Ok(Metamers { session: engine.session(recipe)?, pool: engine.pool()?, answering })
     }
 
     /// The responses to the mean of the model's spectra: one for each of the given sensors.
     pub fn mean(&self) -> Vec<f32> {
-        self.free.1.offset.iter().map(|&response| response as f32).collect()
+        self.answering.free.1.offset.iter().map(|&response| response as f32).collect()
     }
 
     /// Sets the answer to colours for which no candidate is accepted within the recipe's attempts
     /// ([`HardColours::Mode`]).
     pub fn hard(self, hard: HardColours) -> Self {
-        Metamers { hard, ..self }
+        Metamers { answering: Answering { hard, ..self.answering }, ..self }
     }
 
     /// Sets the answer to colours that no spectrum of the model has ([`UnreachableColours::Leave`]).
     pub fn unreachable(self, unreachable: UnreachableColours) -> Self {
-        Metamers { unreachable, ..self }
+        Metamers { answering: Answering { unreachable, ..self.answering }, ..self }
     }
 
     /// Draws spectra of these colours, n responses for each draw, and hands them to `sink` in order, window by window.
@@ -146,43 +143,20 @@ impl<'a> Metamers<'a> {
         mut sink: impl FnMut(MetamerWindow) -> Result<(), E>,
     ) -> Result<AnswerCounts, E> {
         let draws = draws.into();
-        let (count, width) = (draws.count(), self.recipe.program().given);
+        let (count, width) = (draws.count(), self.answering.recipe.program().given);
         assert_eq!(colours.len() as u64, width as u64 * count, "{width} responses for each of {count} draws");
         let mut counts = AnswerCounts::default();
         let mut start = 0;
         while start < count {
             let part = draws.part(start, start.clamp(PARTS[0], PARTS[1]).min(count - start));
             let colours = &colours[start as usize * width..][..part.count() as usize * width];
-            let near = self.near(colours);
-            counts += match near.len() as u64 == part.count() {
-                true => self.draw_all(part, colours, &mut sink)?,
-                false => self.draw_some(part, &near, colours, &mut sink)?,
+            counts += match self.answering.near(colours) {
+                None => self.draw_all(part, colours, &mut sink)?,
+                Some(near) => self.draw_some(part, &near, colours, &mut sink)?,
             };
             start += part.count();
         }
         Ok(counts)
-    }
-
-    /// Numbers of the colours that are not known to be far from all that a spectrum has. No candidate of those is ever
-    /// accepted, so that looking for one takes all attempts; pictures are full of one such colour, as white paper is.
-    fn near(&self, colours: &[f32]) -> Vec<usize> {
-        let known = self.known.lock().expect("no holder panics");
-        let all = colours.chunks_exact(self.recipe.program().given).enumerate();
-        if known.values().all(|best| !best.is_far) {
-            return all.map(|(number, _)| number).collect();
-        }
-        let is_near = |colour: &[f32]| known.get(&bits(colour)).is_none_or(|best| !best.is_far);
-        all.filter(|(_, colour)| is_near(colour)).map(|(number, _)| number).collect()
-    }
-
-    fn answering(&self) -> Answering<'_> {
-        Answering {
-            recipe: self.recipe,
-            hard: self.hard,
-            unreachable: self.unreachable,
-            free: &self.free,
-            known: &self.known,
-        }
     }
 
     fn draw_all<E: From<EngineError> + From<MetamerError>>(
@@ -191,11 +165,10 @@ impl<'a> Metamers<'a> {
         colours: &[f32],
         sink: &mut impl FnMut(MetamerWindow) -> Result<(), E>,
     ) -> Result<AnswerCounts, E> {
-        let (first, width) = (draws.range.first, self.recipe.program().given);
+        let Metamers { session, pool, answering } = self;
+        let (first, width) = (draws.range.first, answering.recipe.program().given);
         let mut counts = AnswerCounts::default();
-        let Metamers { recipe, hard, unreachable, free, known, pool, session } = self;
-        let answering = Answering { recipe, hard: *hard, unreachable: *unreachable, free, known };
-        let formats = recipe.formats();
+        let formats = answering.recipe.formats();
         session.draw_given(draws, colours, |batch| -> Result<(), E> {
             let start = batch.draws.first.wrapping_sub(first) as usize;
             let colours = &colours[start * width..][..batch.draws.count as usize * width];
@@ -217,8 +190,9 @@ impl<'a> Metamers<'a> {
         colours: &[f32],
         sink: &mut impl FnMut(MetamerWindow) -> Result<(), E>,
     ) -> Result<AnswerCounts, E> {
-        let (count, width) = (draws.count(), self.recipe.program().given);
-        let formats = self.recipe.formats();
+        let Metamers { session, pool, answering } = self;
+        let (count, width) = (draws.count(), answering.recipe.program().given);
+        let formats = answering.recipe.formats();
         let mut arrays: Vec<Vec<u8>> =
             formats.iter().map(|format| vec![0; format.bytes(count) as usize]).collect();
         let mut statuses = vec![DrawStatus::FAILED; count as usize];
@@ -226,7 +200,7 @@ impl<'a> Metamers<'a> {
         let given: Vec<f32> =
             numbers.iter().flat_map(|number| &colours[number * width..][..width]).copied().collect();
         if !numbers.is_empty() {
-            self.session.draw_given(draws.range.stream.at(&indices), &given, |batch| -> Result<(), E> {
+            session.draw_given(draws.range.stream.at(&indices), &given, |batch| -> Result<(), E> {
                 let numbers = &numbers[batch.draws.first as usize..][..batch.draws.count as usize];
                 for (&number, status) in numbers.iter().zip(batch.statuses()) {
                     statuses[number] = *status;
@@ -241,9 +215,8 @@ impl<'a> Metamers<'a> {
                 Ok(())
             })?;
         }
-        let answering = self.answering();
         let arrays = arrays.into_iter().map(Cow::Owned).collect();
-        let (answers, arrays) = self.pool.install(|| answering.window(&statuses, arrays, colours, &formats));
+        let (answers, arrays) = pool.install(|| answering.window(&statuses, arrays, colours, &formats));
         answering.check(&answers, colours, |number| draws.index(number as u64))?;
         sink(MetamerWindow { draws: draws.range, answers: &answers, formats: &formats, arrays })?;
         let mut counts = AnswerCounts::default();
@@ -261,24 +234,23 @@ impl<'a> Metamers<'a> {
         colours: &[f32],
         mut sink: impl FnMut(MetamerWindow) -> Result<(), E>,
     ) -> Result<AnswerCounts, E> {
-        let width = self.recipe.program().given;
+        let Metamers { pool, answering, .. } = self;
+        let width = answering.recipe.program().given;
         assert!(colours.len().is_multiple_of(width), "{width} responses for each colour");
-        let formats = self.recipe.formats();
+        let formats = answering.recipe.formats();
         let mut counts = AnswerCounts::default();
-        let answering = Answering { hard: HardColours::Mode, ..self.answering() };
         for (number, window) in colours.chunks(WINDOW * width).enumerate() {
             let count = window.len() / width;
             let mut arrays: Vec<Cow<[u8]>> =
                 formats.iter().map(|format| vec![0; format.bytes(count as u64) as usize].into()).collect();
             let wanted: Vec<usize> = (0..count).collect();
             let mut answers = vec![Answer::Skipped; count];
-            self.pool.install(|| answering.fill(&wanted, window, &formats, &mut arrays, &mut answers));
+            let hard = HardColours::Mode;
+            pool.install(|| answering.fill(hard, &wanted, window, &formats, &mut arrays, &mut answers));
             counts.add(&answers);
-            let first = number * WINDOW;
-            answering.check(&answers, window, |at| (first + at) as u64)?;
             let draws = DrawRange {
                 stream: crate::random::stream::Stream::new(0),
-                first: first as u64,
+                first: (number * WINDOW) as u64,
                 count: count as u64,
             };
             sink(MetamerWindow { draws, answers: &answers, formats: &formats, arrays })?;
@@ -287,17 +259,31 @@ impl<'a> Metamers<'a> {
     }
 }
 
-/// Settings of answers, apart from the session that draws.
-#[derive(Clone, Copy)]
+/// Answers to colours, apart from the session that draws.
 struct Answering<'a> {
     recipe: &'a Recipe,
     hard: HardColours,
     unreachable: UnreachableColours,
-    free: &'a (Program, Affine),
-    known: &'a Known,
+    /// The model's own Gaussian, without responses given, and the map of the responses.
+    free: (Program, Affine),
+    known: Mutex<Known>,
 }
 
 impl Answering<'_> {
+    /// Numbers of the colours that are not known to be far from all that a spectrum has; `None` where none is. No candidate
+    /// of those that are is ever accepted, so that looking for one takes all attempts; pictures are full of one such
+    /// colour, as white paper is.
+    fn near(&self, colours: &[f32]) -> Option<Vec<usize>> {
+        let known = self.known.lock().expect("no holder panics");
+        if known.far.is_empty() {
+            return None;
+        }
+        let all = colours.chunks_exact(self.recipe.program().given).enumerate();
+        let near = all.filter(|(_, colour)| !known.far.contains(bits(colour)));
+        let near: Vec<usize> = near.map(|(number, _)| number).collect();
+        Some(near).filter(|near| near.len() * self.recipe.program().given < colours.len())
+    }
+
     /// Answers and arrays of some draws: those that were drawn, and what stands in for the others.
     fn window<'b>(
         &self,
@@ -315,7 +301,7 @@ impl Answering<'_> {
             .collect();
         let hard: Vec<usize> = (0..answers.len()).filter(|&i| answers[i] == Answer::Skipped).collect();
         if !hard.is_empty() {
-            self.fill(&hard, colours, formats, &mut arrays, &mut answers);
+            self.fill(self.hard, &hard, colours, formats, &mut arrays, &mut answers);
         }
         (answers, arrays)
     }
@@ -323,6 +309,7 @@ impl Answering<'_> {
     /// Answers the colours of some draws with their best spectra.
     fn fill(
         &self,
+        hard: HardColours,
         wanted: &[usize],
         colours: &[f32],
         formats: &[ArrayFormat],
@@ -332,7 +319,7 @@ impl Answering<'_> {
         let program = self.recipe.program();
         let width = program.given;
         let best: Vec<Best> =
-            wanted.par_iter().map(|&number| self.best(&colours[number * width..][..width])).collect();
+            wanted.par_iter().map(|&number| self.best(hard, &colours[number * width..][..width])).collect();
         for (&number, best) in wanted.iter().zip(&best) {
             answers[number] = best.answer;
         }
@@ -350,42 +337,53 @@ impl Answering<'_> {
         }
     }
 
-    /// The best spectrum of a colour.
-    fn best(&self, colour: &[f32]) -> Best {
+    /// The best spectrum of a colour, where hard colours have one.
+    fn best(&self, hard: HardColours, colour: &[f32]) -> Best {
+        let best = self.known(colour);
+        match (best.answer, hard) {
+            (Answer::Mode, HardColours::Skip | HardColours::Error) => {
+                Best { answer: Answer::Skipped, inputs: None }
+            }
+            _ => best,
+        }
+    }
+
+    /// The best spectrum of a colour, which is found once.
+    fn known(&self, colour: &[f32]) -> Best {
         let bits = bits(colour);
-        if let Some(known) = self.known.lock().expect("no holder panics").get(&bits) {
-            return known.clone();
+        if let Some(best) = self.known.lock().expect("no holder panics").best.get(bits) {
+            return best.clone();
         }
         let colour: Vec<f64> = colour.iter().map(|&value| value.into()).collect();
-        let best = self.found(&colour);
+        let (best, is_far) = self.found(&colour);
         let mut known = self.known.lock().expect("no holder panics");
-        if known.len() >= 1 << 20 {
-            known.clear();
+        if known.best.len() >= 1 << 20 {
+            *known = Known::default();
         }
-        known.insert(bits, best.clone());
+        known.best.insert(bits.to_vec(), best.clone());
+        if is_far {
+            known.far.insert(bits.to_vec());
+        }
         best
     }
 
-    fn found(&self, colour: &[f64]) -> Best {
+    /// The best spectrum of a colour, and whether the colour is far from all that a spectrum has.
+    fn found(&self, colour: &[f64]) -> (Best, bool) {
         let program = self.recipe.program();
         let inputs = |colour: &[f64], normals: Vec<f64>| Some([colour.to_vec(), normals].concat());
         if let Some(normals) = mode(&program.at(colour)) {
-            let (answer, inputs) = match self.hard {
-                HardColours::Mode => (Answer::Mode, inputs(colour, normals)),
-                HardColours::Skip | HardColours::Error => (Answer::Skipped, None),
-            };
-            return Best { answer, inputs, is_far: false };
+            return (Best { answer: Answer::Mode, inputs: inputs(colour, normals) }, false);
         }
         let nearest = feasibility::nearest(&self.free.0, &self.free.1, colour);
         let mean = self.free.1.offset.iter().fold(0.0, |largest: f64, response| largest.max(response.abs()));
         let is_far = nearest.as_ref().is_some_and(|nearest| distance(nearest, colour) > FAR * mean);
-        let nothing = Best { answer: Answer::Unreachable, inputs: None, is_far };
+        let nothing = (Best { answer: Answer::Unreachable, inputs: None }, is_far);
         if self.unreachable == UnreachableColours::Leave {
             return nothing;
         }
         let Some((near, normals)) = nearest.and_then(|nearest| self.within(&nearest)) else { return nothing };
         let answer = Answer::Nearest { distance: distance(&near, colour) as f32 };
-        Best { answer, inputs: inputs(&near, normals), is_far }
+        (Best { answer, inputs: inputs(&near, normals) }, is_far)
     }
 
     /// The colour that a spectrum has next to the nearest, and the normals of its most probable one. The very nearest leave
@@ -423,8 +421,8 @@ impl Answering<'_> {
     }
 }
 
-fn bits(colour: &[f32]) -> Vec<u32> {
-    colour.iter().map(|value| value.to_bits()).collect()
+fn bits(colour: &[f32]) -> &[u32] {
+    bytemuck::cast_slice(colour)
 }
 
 /// Largest difference of two colours in a response.
