@@ -79,6 +79,28 @@ fn every_format_gives_the_model_of_the_draws() {
     }
 }
 
+/// Spectra of any width of float are read back as they were written.
+#[test]
+fn every_width_is_read_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for dtype in ["f16", "f64"] {
+        let sample = format!("sample munsell-vrhel -n {DRAWS} --seed 5 --engine cpu --dtype {dtype} --force");
+        succeeds(folder, &format!("{sample} -o a.npy"));
+        let (mean, covariance, _) = fit(folder, "a.npy@400:10:700", "--kind reflectance");
+        let mut formats = vec!["b.npz", "c.h5", "f.zarr --chunk 70", "g/ --format npy --chunk 70"];
+        if dtype == "f64" {
+            formats.extend(["d.mat", "e.parquet"]); // which are not written in half precision
+        }
+        for output in formats {
+            succeeds(folder, &format!("{sample} -o {output}"));
+            let (file, _) = output.split_once(' ').unwrap_or((output, ""));
+            let found = fit(folder, file, "");
+            assert_eq!((&found.0, &found.1), (&mean, &covariance), "{output}, {dtype}");
+        }
+    }
+}
+
 /// Draws of a set with labels beside them: the spectra are found among all arrays.
 #[test]
 fn labels_beside_draws_are_no_spectra() {

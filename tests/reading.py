@@ -1,12 +1,17 @@
 """Writes files of spectra as other people's programs do, and what is in them as JSON: name, wavelengths (nm) and spectra,
 or a word of the refusal. Names may have an array and wavelengths behind them, as the program takes them."""
+import decimal
 import json
 import os
+import shutil
 import sys
 
 import h5py
+import numcodecs
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import scipy.io
 import zarr
 
@@ -63,6 +68,9 @@ with h5py.File("microns.h5", "w") as f:
     f["wavelength"].attrs["units"] = "micrometers"
     f["reflectance"] = R.astype("f4")
 right("microns.h5", R.astype("f4"))
+right(h5("half.h5", wavelength=w, reflectance=R.astype("f2")), R.astype("f2"))
+refused(h5("long.h5", wavelength=w, reflectance=R.astype(np.longdouble)), "long.h5", "float64")
+right(h5("half-big.h5", wavelength=w, reflectance=R.astype(">f2")), R.astype("f2"))
 
 # MATLAB
 def mat(name, **values):
@@ -109,7 +117,37 @@ right("rows.parquet")
 named = frame.copy()
 named.insert(0, "sample", [f"leaf {n}" for n in range(20)])
 named.to_parquet("named.parquet", compression="snappy")
-right("named.parquet")
+right("named.parquet", names=list(named["sample"]))
+# A name that is missing moves none of the others.
+named.loc[2, "sample"] = None
+named.to_parquet("unnamed.parquet", compression="none")
+right("unnamed.parquet", names=["" if pd.isna(name) else name for name in named["sample"]])
+
+
+def parquet(name, columns, metadata=None, **options):
+    pq.write_table(pa.table(columns, metadata=metadata), name, compression="snappy", **options)
+    return name
+
+
+exact = [[decimal.Decimal(f"{v:.4f}") for v in column] for column in R.T]
+columns = {str(int(v)): pa.array(values, pa.decimal128(9, 4)) for v, values in zip(w, exact)}
+right(parquet("decimals.parquet", columns, store_decimal_as_integer=True), np.round(R, 4))
+counts = np.round(R * 60000)
+right(parquet("counts.parquet", {str(int(v)): column.astype("u2") for v, column in zip(w, counts.T)}), counts)
+high = np.round(R * 4e9)
+right(parquet("high.parquet", {str(int(v)): column.astype("u4") for v, column in zip(w, high.T)}), high)
+waves = {"wavelength": json.dumps(list(w))}
+lists = [list(spectrum) for spectrum in R]
+right(parquet("lists.parquet", {"spectra": lists}, waves))
+right(parquet("groups.parquet", {"spectra": lists}, waves, row_group_size=7))
+lists[3][4] = None
+gap = R.copy()
+gap[3, 4] = np.nan
+right(parquet("gap.parquet", {"spectra": lists}, waves), gap)
+for name, at in [("first", 0), ("inner", 9), ("last", 19)]:
+    for what, odd in [("twice", lists[0] * 2), ("short", lists[0][:-1]), ("empty", []), ("none", None)]:
+        uneven = lists[:at] + [odd] + lists[at + 1 :]
+        refused(parquet(f"{name}-{what}.parquet", {"spectra": uneven}, waves), "not of one length")
 down = pd.DataFrame(R.T, columns=[f"s{n}" for n in range(20)])
 down.insert(0, "wavelength", w)
 down.to_parquet("columns.parquet", compression="none")
@@ -127,12 +165,42 @@ for version in (2, 3):
         if version == 3:
             codec = {"compressors": None} if packing == "plain" else {}
         else:
-            import numcodecs
             codec = {"compressors": None if packing == "plain" else numcodecs.Zstd()}
         for key, value, chunks in (("wavelength", w, (31,)), ("reflectance", R, (7, 10))):
             a = g.create_array(key, shape=value.shape, chunks=chunks, dtype=value.dtype, **codec)
             a[:] = value
         right(name)
+
+
+def chunked(name, **options):
+    g = zarr.open_group(name, mode="w", zarr_format=2)
+    for key, value, chunks in (("wavelength", w, (31,)), ("reflectance", R, (7, 10))):
+        g.create_array(key, shape=value.shape, chunks=chunks, compressors=None, **options | {"dtype": value.dtype})[:] = value
+    return name
+
+
+right(chunked("fortran.zarr", order="F"))
+for packing in (numcodecs.GZip(), numcodecs.Zlib()):
+    name = f"{packing.codec_id}.zarr"
+    g = zarr.open_group(name, mode="w", zarr_format=2)
+    for key, value in (("wavelength", w), ("reflectance", R)):
+        a = g.create_array(key, shape=value.shape, chunks=value.shape, dtype=">f8", compressors=packing)
+        a[:] = value
+    right(name)
+    chunk = f"{name}/reflectance/0.0"
+    whole = open(chunk, "rb").read()
+    # The last bytes are a sum.
+    open(chunk, "wb").write(whole[:-4] + bytes(4))
+    shutil.copytree(name, f"sum-{name}")
+    refused(f"sum-{name}", "chunk 0.0 is damaged")
+    open(chunk, "wb").write(whole)
+for name, change in [("short", lambda chunk: chunk[:-1]), ("long", lambda chunk: chunk + b"x")]:
+    for order in "CF":
+        store = chunked(f"{name}-{order}.zarr", order=order)
+        chunk = f"{store}/reflectance/1.2"
+        changed = change(open(chunk, "rb").read())
+        open(chunk, "wb").write(changed)
+        refused(store, "chunk 1.2", "copy it again")
 
 # Spreadsheets, where a writer is there
 try:

@@ -16,6 +16,7 @@ struct Case {
     wavelengths: Option<Vec<f64>>,
     spectra: Option<Vec<Vec<Option<f64>>>>,
     refused: Option<Vec<String>>,
+    names: Option<Vec<String>>,
     unit: Option<String>,
 }
 
@@ -51,6 +52,9 @@ fn assert_right(case: &Case, table: &Table) {
     let (wavelengths, spectra) = (case.wavelengths.as_ref().unwrap(), case.spectra.as_ref().unwrap());
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs().max(1e-3);
     assert_eq!((table.len(), table.wavelengths().len()), (spectra.len(), wavelengths.len()), "{}", case.name);
+    if let Some(names) = &case.names {
+        assert_eq!(table.names(), names, "{}", case.name);
+    }
     for (band, expected) in wavelengths.iter().enumerate() {
         // Single precision of a wavelength is as the file has it.
         let found = table.wavelengths()[band];

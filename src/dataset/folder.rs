@@ -81,7 +81,7 @@ fn manifest_kind(folder: &Path) -> Option<super::SpectrumKind> {
 fn parquet_parts(folder: &Path, parts: &[PathBuf], options: &ReadOptions) -> Result<Reading, DatasetError> {
     let mut columns = super::parquet::Columns::default();
     for path in parts {
-        columns.add(path, files::read(path)?)?;
+        columns.add(path, files::Source::open(path)?)?;
     }
     columns.table(folder, options)
 }

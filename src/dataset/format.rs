@@ -5,7 +5,7 @@ use std::path::Path;
 use super::arrays::choose;
 use super::files::Source;
 use super::reading::{ReadOptions, Reading};
-use super::{DatasetError, envi, files, folder, hdf5_bytes, mat, npy, npz, spdx, text};
+use super::{DatasetError, envi, files, folder, hdf5_arrays, mat, npy, npz, spdx, text};
 
 /// Endings of the names of tables, for those who ask without opening one.
 const ENDINGS: [&str; 30] = [
@@ -53,13 +53,13 @@ pub(super) fn read_source(
     let head = source.head().map_err(failed)?;
     let bytes = |source: Source| source.into_bytes().map_err(failed);
     if is_hdf5(&head) {
-        return choose(path, hdf5_bytes(path, bytes(source)?)?, options);
+        return choose(path, hdf5_arrays(path, source)?, options);
     }
     if npy::begins(&head) {
         return choose(path, npy::arrays(path, source)?, options);
     }
     if head.starts_with(b"PAR1") {
-        return parquet(path, bytes(source)?, options);
+        return parquet(path, source, options);
     }
     if head.starts_with(b"PK") {
         return match npz::kind(&mut source) {
@@ -136,12 +136,12 @@ fn spreadsheet(path: &Path, _: &[u8], _: &ReadOptions) -> Result<Reading, Datase
 }
 
 #[cfg(feature = "parquet")]
-fn parquet(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Reading, DatasetError> {
-    super::parquet::read(path, bytes, options)
+fn parquet(path: &Path, source: Source, options: &ReadOptions) -> Result<Reading, DatasetError> {
+    super::parquet::read(path, source, options)
 }
 
 #[cfg(not(feature = "parquet"))]
-fn parquet(path: &Path, _: Vec<u8>, _: &ReadOptions) -> Result<Reading, DatasetError> {
+fn parquet(path: &Path, _: Source, _: &ReadOptions) -> Result<Reading, DatasetError> {
     Err(not_built(path, "Parquet", "this build leaves out Parquet: build it with the feature parquet"))
 }
 

@@ -1,15 +1,19 @@
 //! HDF5 files, and those of MATLAB v7.3, which are HDF5: every numeric array in them and in their groups.
 //!
-//! Whoever wrote the file may be hostile. The file is in memory before it is parsed, so that what is read is never more
-//! than was checked; sizes that a file claims are compared with what it can hold before anything is allocated; and the
-//! parser's panics, should it have any left, end as errors.
+//! Whoever wrote the file may be hostile. Sizes that a file claims are compared with what it can hold before anything is
+//! allocated, and the parser's panics, should it have any left, end as errors.
 
 use std::collections::HashMap;
 use std::path::Path;
 
-use hdf5_pure::{AttrValue, Dataset, Error, File, Group};
+use hdf5_pure::{
+    AttrValue, Dataset, Datatype, DatatypeByteOrder, Error, File, FileAccessProperties, FloatingPointLayout,
+    Group, MetadataCacheConfig, ReadSeekSource,
+};
 
 use super::arrays::{self, Array, Arrays, Order};
+use super::files::{self, Source};
+use super::numbers::{Number, NumberKind};
 use super::units::WavelengthUnit;
 use super::{DatasetError, MAX_VALUES};
 use crate::caught::caught;
@@ -21,12 +25,16 @@ const MAX_DEPTH: usize = 6;
 /// Largest number of arrays that are looked at.
 const MAX_ARRAYS: usize = 2000;
 
+/// What is kept of the parts of a file that describe it: each is a few bytes, and many are read again and again.
+const CACHE_BYTES: usize = 1 << 20;
+
 /// Largest ratio of what chunks unpack to, to what they take in the file: that of deflate.
 const MAX_RATIO: u64 = 1100;
 
-pub(super) fn arrays(path: &Path, bytes: Vec<u8>) -> Result<Arrays, DatasetError> {
+pub(super) fn arrays(path: &Path, mut source: Source) -> Result<Arrays, DatasetError> {
     let failed = |reason: String| DatasetError::Format { path: path.to_owned(), format: "HDF5", reason };
-    let read = caught(|| read(bytes));
+    let is_matlab = source.head().map_err(|error| files::failed(path, error))?.starts_with(b"MATLAB");
+    let read = caught(|| read(source, is_matlab));
     match read {
         Some(Ok(arrays)) => Ok(arrays),
         Some(Err(Fault::TooLarge)) => Err(DatasetError::TooLarge { path: path.to_owned() }),
@@ -57,9 +65,12 @@ struct Walk {
     is_matlab: bool,
 }
 
-fn read(bytes: Vec<u8>) -> Result<Arrays, Fault> {
-    let (file_bytes, is_matlab) = (bytes.len() as u64, bytes.starts_with(b"MATLAB"));
-    let file = File::from_bytes(bytes)?;
+fn read(source: Source, is_matlab: bool) -> Result<Arrays, Fault> {
+    let source = ReadSeekSource::new(source).map_err(Error::from)?;
+    let cache = MetadataCacheConfig::new(CACHE_BYTES);
+    let file =
+        File::from_source_with_options(source, FileAccessProperties::new().with_metadata_cache(cache))?;
+    let file_bytes = file.file_size();
     let format = if is_matlab { "MATLAB file, version 7.3 (.mat)" } else { "HDF5" };
     let order = if is_matlab { Order::FirstFirst } else { Order::LastFirst };
     let root = file.root();
@@ -136,7 +147,12 @@ impl Walk {
         {
             return Ok(());
         }
-        let mut values = set.read_f64().map_err(placed)?;
+        let mut values = if size > 8 { Vec::new() } else { numbers(set).map_err(placed)? };
+        if values.is_empty() && count > 0 {
+            return Err(Fault::Other(format!(
+                "{name:?} holds numbers of a type that is not read: write it as float64"
+            )));
+        }
         if values.len() as u64 != count {
             return Err(Fault::Other(format!(
                 "{name:?} holds {}, not {count}; copy it again",
@@ -168,7 +184,7 @@ impl Walk {
 
     /// Applies the attributes by which files say what their numbers mean, as netCDF's conventions have them.
     fn packing(&mut self, name: &str, attributes: &HashMap<String, AttrValue>, values: &mut [f64]) {
-        let numbers = |key: &str| attributes.get(key).and_then(numbers).unwrap_or_default();
+        let numbers = |key: &str| attributes.get(key).and_then(attribute_numbers).unwrap_or_default();
         let first = |key: &str| numbers(key).first().copied();
         let mut said = Vec::new();
         let missing: Vec<f64> = ["_FillValue", "missing_value"].into_iter().flat_map(numbers).collect();
@@ -205,12 +221,33 @@ fn is_number(set: &Dataset) -> Result<bool, Error> {
     Ok(match dtype {
         F32 | F64 | I8 | I16 | I32 | I64 | U8 | U16 | U32 | U64 => true,
         // Half precision and the like.
-        Other(datatype) => matches!(
-            *datatype,
-            hdf5_pure::Datatype::FloatingPoint { .. } | hdf5_pure::Datatype::FixedPoint { .. }
-        ),
+        Other(datatype) => {
+            matches!(*datatype, Datatype::FloatingPoint { .. } | Datatype::FixedPoint { .. })
+        }
         _ => false,
     })
+}
+
+/// The values of a data set; none where their type is unknown.
+fn numbers(set: &Dataset) -> Result<Vec<f64>, Error> {
+    // The parser reads no half precision.
+    const HALF: FloatingPointLayout = FloatingPointLayout {
+        bit_offset: 0,
+        bit_precision: 16,
+        exponent_location: 10,
+        exponent_size: 5,
+        mantissa_location: 0,
+        mantissa_size: 10,
+        exponent_bias: 15,
+    };
+    match set.datatype()? {
+        Datatype::FloatingPoint { size: 2, byte_order, layout: HALF } => {
+            let big_endian = byte_order == DatatypeByteOrder::BigEndian;
+            let number = Number { kind: NumberKind::Float, bytes: 2, big_endian };
+            Ok(number.read_all(&set.read_raw()?))
+        }
+        _ => set.read_f64(),
+    }
 }
 
 /// Text of an attribute.
@@ -219,7 +256,7 @@ fn text(attributes: &HashMap<String, AttrValue>, key: &str) -> Option<String> {
 }
 
 /// Numbers of an attribute.
-fn numbers(value: &AttrValue) -> Option<Vec<f64>> {
+fn attribute_numbers(value: &AttrValue) -> Option<Vec<f64>> {
     use AttrValue::*;
     Some(match value {
         F32(v) => vec![f64::from(*v)],

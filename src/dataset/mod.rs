@@ -62,12 +62,12 @@ fn too_many(values: usize) -> String {
 }
 
 #[cfg(feature = "hdf5")]
-fn hdf5_bytes(path: &std::path::Path, bytes: Vec<u8>) -> Result<arrays::Arrays, DatasetError> {
-    hdf5::arrays(path, bytes)
+fn hdf5_arrays(path: &std::path::Path, source: files::Source) -> Result<arrays::Arrays, DatasetError> {
+    hdf5::arrays(path, source)
 }
 
 #[cfg(not(feature = "hdf5"))]
-fn hdf5_bytes(path: &std::path::Path, _: Vec<u8>) -> Result<arrays::Arrays, DatasetError> {
+fn hdf5_arrays(path: &std::path::Path, _: files::Source) -> Result<arrays::Arrays, DatasetError> {
     let reason =
         "this build leaves out HDF5: build it with the feature hdf5, or resave with save(file, '-v7')";
     Err(format::not_built(path, "HDF5", reason))

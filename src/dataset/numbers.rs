@@ -99,7 +99,8 @@ impl Number {
         Ok(values)
     }
 
-    fn add(self, bytes: &[u8], values: &mut Vec<f64>) {
+    /// Reads all numbers of these bytes behind those that are there.
+    pub(super) fn add(self, bytes: &[u8], values: &mut Vec<f64>) {
         match (self.kind, self.bytes, self.big_endian) {
             (NumberKind::Float, 8, false) => {
                 values.extend(bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)));

@@ -5,19 +5,58 @@ use std::path::Path;
 
 use bytes::Bytes;
 use half::f16;
-use parquet::basic::LogicalType;
-use parquet::column::reader::ColumnReader;
+use parquet::basic::{ConvertedType, LogicalType};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{ByteArray, ByteArrayType, FixedLenByteArray};
 use parquet::errors::ParquetError;
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
 
 use super::arrays::{self, Array, Arrays, Order};
+use super::files::Source;
 use super::reading::{Decimal, ReadOptions, Reading};
 use super::sheet::{Cell, Sheet};
 use super::{DatasetError, MAX_BYTES, MAX_VALUES, text};
 use crate::caught::caught;
 
-/// Records that are read at a time.
-const BATCH: usize = 1 << 16;
+/// Records that are read at a time: spectra, where a column is one of lists.
+const BATCH: usize = 1 << 10;
+
+/// Largest number of words of a column: names of spectra are fewer.
+const MAX_TEXTS: usize = 2_000_000;
+
+/// What the numbers of a column stand for, where it is not what their type says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Meaning {
+    Itself,
+    /// Bytes of a number of half precision.
+    Half,
+    Unsigned,
+    /// Integers with as many digits behind the point.
+    Decimal(i32),
+}
+
+impl Meaning {
+    fn of(column: &ColumnDescriptor) -> Meaning {
+        match (column.logical_type_ref(), column.converted_type()) {
+            (Some(LogicalType::Float16), _) => Meaning::Half,
+            (Some(LogicalType::Decimal { .. }), _) | (_, ConvertedType::DECIMAL) => {
+                Meaning::Decimal(column.type_scale())
+            }
+            (_, ConvertedType::UINT_8 | ConvertedType::UINT_16) => Meaning::Unsigned,
+            (_, ConvertedType::UINT_32 | ConvertedType::UINT_64) => Meaning::Unsigned,
+            _ => Meaning::Itself,
+        }
+    }
+
+    /// What a number of a column is divided by.
+    fn divisor(self) -> f64 {
+        match self {
+            Meaning::Decimal(digits) => 10f64.powi(digits),
+            _ => 1.0,
+        }
+    }
+}
 
 /// A column, read.
 struct Column {
@@ -41,18 +80,21 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Adds the rows of a file to those before.
-    pub(super) fn add(&mut self, path: &Path, bytes: Vec<u8>) -> Result<(), DatasetError> {
+    pub(super) fn add(&mut self, path: &Path, source: Source) -> Result<(), DatasetError> {
         let failed =
             |reason: String| DatasetError::Format { path: path.to_owned(), format: "Parquet", reason };
         let taken = std::mem::take(self);
-        let read = caught(|| taken.with(bytes));
+        let read = caught(|| match source {
+            Source::File(file) => taken.with(file),
+            Source::Memory(bytes) => taken.with(Bytes::from(bytes.into_inner())),
+        });
         *self = read.ok_or_else(|| failed("it is damaged; copy it again".to_owned()))?.map_err(failed)?;
         Ok(())
     }
 
-    fn with(mut self, bytes: Vec<u8>) -> Result<Columns, String> {
+    fn with(mut self, source: impl ChunkReader + 'static) -> Result<Columns, String> {
         let wrong = |error: ParquetError| error.to_string();
-        let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(wrong)?;
+        let reader = SerializedFileReader::new(source).map_err(wrong)?;
         let metadata = reader.metadata();
         for note in metadata.file_metadata().key_value_metadata().into_iter().flatten() {
             match (note.key.as_str(), &note.value) {
@@ -65,7 +107,7 @@ impl Columns {
         let is_first = self.columns.is_empty();
         for (index, description) in schema.columns().iter().enumerate() {
             let name = description.path().parts().first().cloned().unwrap_or_default();
-            let is_half = matches!(description.logical_type_ref(), Some(LogicalType::Float16));
+            let meaning = Meaning::of(description);
             let mut column = Column { name, values: Vec::new(), width: None, texts: Vec::new() };
             for group in 0..metadata.num_row_groups() {
                 if metadata.row_group(group).column(index).uncompressed_size() as u64 > MAX_BYTES {
@@ -74,7 +116,7 @@ impl Columns {
                 let group = reader.get_row_group(group).map_err(wrong)?;
                 let levels = (description.max_def_level(), description.max_rep_level());
                 let column_reader = group.get_column_reader(index).map_err(wrong)?;
-                read_column(column_reader, levels, is_half, &mut column)?;
+                read_column(column_reader, levels, meaning, &mut column)?;
                 if self.values + column.values.len() > MAX_VALUES {
                     return Err(super::too_many(self.values + column.values.len()));
                 }
@@ -139,9 +181,9 @@ impl Columns {
 }
 
 /// Reads one file.
-pub(super) fn read(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Reading, DatasetError> {
+pub(super) fn read(path: &Path, source: Source, options: &ReadOptions) -> Result<Reading, DatasetError> {
     let mut columns = Columns::default();
-    columns.add(path, bytes)?;
+    columns.add(path, source)?;
     columns.table(path, options)
 }
 
@@ -149,16 +191,20 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result
 fn read_column(
     reader: ColumnReader,
     (max_def, max_rep): (i16, i16),
-    is_half: bool,
+    meaning: Meaning,
     column: &mut Column,
 ) -> Result<(), String> {
     let (mut defs, mut reps) = (Vec::new(), Vec::new());
-    let mut values: Vec<f64> = Vec::new();
+    let mut lists = Lists { width: column.width, ..Lists::default() };
+    let values = &mut column.values;
     macro_rules! all {
         ($reader:expr, $value:expr) => {{
             let mut reader = $reader;
+            let mut batch = Vec::new();
             loop {
-                let mut batch = Vec::new();
+                defs.clear();
+                reps.clear();
+                batch.clear();
                 let (records, _, levels) = reader
                     .read_records(
                         BATCH,
@@ -167,62 +213,123 @@ fn read_column(
                         &mut batch,
                     )
                     .map_err(|e| e.to_string())?;
-                for value in &batch {
-                    $value(value);
+                match max_def {
+                    0 => values.extend(batch.iter().map($value)),
+                    // Nulls have a level and no value.
+                    _ => {
+                        let mut there = batch.iter().map($value);
+                        let mut next = || there.next().unwrap_or(f64::NAN);
+                        values.extend(defs.iter().map(|def| if *def == max_def { next() } else { f64::NAN }));
+                    }
+                }
+                if !reps.iter().all(|rep| lists.add(*rep == 0)) {
+                    return Err(uneven(&column.name));
                 }
                 if records == 0 && levels == 0 {
                     break;
                 }
-                if values.len().max(defs.len()) > MAX_VALUES {
+                if values.len() > MAX_VALUES {
                     return Err(super::too_many(values.len()));
                 }
             }
         }};
     }
-    let mut texts: Vec<String> = Vec::new();
     match reader {
-        ColumnReader::FloatColumnReader(reader) => all!(reader, |v: &f32| values.push(f64::from(*v))),
-        ColumnReader::DoubleColumnReader(reader) => all!(reader, |v: &f64| values.push(*v)),
-        ColumnReader::Int32ColumnReader(reader) => all!(reader, |v: &i32| values.push(f64::from(*v))),
-        ColumnReader::Int64ColumnReader(reader) => all!(reader, |v: &i64| values.push(*v as f64)),
-        ColumnReader::FixedLenByteArrayColumnReader(reader) if is_half => {
-            all!(reader, |v: &parquet::data_type::FixedLenByteArray| {
-                let half = v.data().first_chunk().map_or(f16::NAN, |bytes| f16::from_le_bytes(*bytes));
-                values.push(half.to_f64());
+        ColumnReader::FloatColumnReader(reader) => all!(reader, |v: &f32| f64::from(*v)),
+        ColumnReader::DoubleColumnReader(reader) => all!(reader, |v: &f64| *v),
+        ColumnReader::Int32ColumnReader(reader) => match meaning {
+            Meaning::Unsigned => all!(reader, |v: &i32| f64::from(v.cast_unsigned())),
+            _ => all!(reader, |v: &i32| f64::from(*v) / meaning.divisor()),
+        },
+        ColumnReader::Int64ColumnReader(reader) => match meaning {
+            Meaning::Unsigned => all!(reader, |v: &i64| v.cast_unsigned() as f64),
+            _ => all!(reader, |v: &i64| *v as f64 / meaning.divisor()),
+        },
+        ColumnReader::FixedLenByteArrayColumnReader(reader) if meaning == Meaning::Half => {
+            all!(reader, |v: &FixedLenByteArray| {
+                v.data().first_chunk().map_or(f64::NAN, |bytes| f16::from_le_bytes(*bytes).to_f64())
             });
         }
-        ColumnReader::ByteArrayColumnReader(reader) => {
-            all!(reader, |v: &parquet::data_type::ByteArray| texts
-                .push(String::from_utf8_lossy(v.data()).into_owned()));
-            column.texts.append(&mut texts);
-            return Ok(());
-        }
+        ColumnReader::ByteArrayColumnReader(reader) => return read_texts(reader, max_def, max_rep, column),
         // Dates, truth values and the like are no spectra.
         _ => {
             column.texts.push(String::new());
             return Ok(());
         }
     }
-    // Nulls have a level and no value.
-    let all: Vec<f64> = match max_def {
-        0 => values,
-        _ => {
-            let mut next = values.into_iter();
-            defs.iter()
-                .map(|def| if *def == max_def { next.next().unwrap_or(f64::NAN) } else { f64::NAN })
-                .collect()
-        }
-    };
-    if max_rep > 0 && !all.is_empty() {
-        let starts: Vec<usize> = (0..reps.len()).filter(|i| reps[*i] == 0).collect();
-        let width = starts.get(1).copied().unwrap_or(all.len());
-        let is_even = starts.iter().enumerate().all(|(row, start)| *start == row * width);
-        if !is_even || !all.len().is_multiple_of(width) || column.width.is_some_and(|before| before != width)
-        {
-            return Err(format!("the lists of {:?} are not of one length", column.name));
-        }
-        column.width = Some(width);
+    if max_rep > 0 && lists.values > 0 {
+        column.width = Some(lists.one_width().ok_or_else(|| uneven(&column.name))?);
     }
-    column.values.extend(all);
     Ok(())
+}
+
+/// Adds the words of a part of a column.
+fn read_texts(
+    mut reader: ColumnReaderImpl<ByteArrayType>,
+    max_def: i16,
+    max_rep: i16,
+    column: &mut Column,
+) -> Result<(), String> {
+    let (mut defs, mut reps, mut batch) = (Vec::new(), Vec::new(), Vec::new());
+    loop {
+        defs.clear();
+        reps.clear();
+        batch.clear();
+        let (records, _, levels) = reader
+            .read_records(
+                BATCH,
+                (max_def > 0).then_some(&mut defs),
+                (max_rep > 0).then_some(&mut reps),
+                &mut batch,
+            )
+            .map_err(|e| e.to_string())?;
+        let mut there =
+            batch.iter().map(|bytes: &ByteArray| String::from_utf8_lossy(bytes.data()).into_owned());
+        match max_def {
+            0 => column.texts.extend(there),
+            _ => {
+                let mut next = || there.next().unwrap_or_default();
+                column
+                    .texts
+                    .extend(defs.iter().map(|def| if *def == max_def { next() } else { String::new() }));
+            }
+        }
+        if records == 0 && levels == 0 {
+            return Ok(());
+        }
+        if column.texts.len() > MAX_TEXTS {
+            return Err(format!("{:?} has more than {MAX_TEXTS} words: leave it out", column.name));
+        }
+    }
+}
+
+fn uneven(name: &str) -> String {
+    format!("the lists of {name:?} are not of one length")
+}
+
+/// Lengths of lists, whose values come one by one.
+#[derive(Default)]
+struct Lists {
+    starts: usize,
+    values: usize,
+    width: Option<usize>,
+}
+
+impl Lists {
+    /// Adds a value, which may begin a list; returns whether the lists before it are of one length.
+    fn add(&mut self, is_first: bool) -> bool {
+        let is_even = match self.starts {
+            _ if !is_first => true,
+            0 => self.values == 0,
+            lists => self.values == lists * *self.width.get_or_insert(self.values),
+        };
+        (self.starts, self.values) = (self.starts + usize::from(is_first), self.values + 1);
+        is_even
+    }
+
+    /// The length of all lists, where it is one.
+    fn one_width(&self) -> Option<usize> {
+        let width = self.width.unwrap_or(self.values);
+        (self.values == self.starts * width).then_some(width)
+    }
 }

@@ -1,6 +1,7 @@
 //! Zarr stores in a folder, of versions 2 and 3: arrays whose chunks are plain, or packed by Zstandard, gzip or zlib.
 
-use std::io::Read;
+use std::fs::File;
+use std::io::{self, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -8,7 +9,8 @@ use serde_json::Value;
 use super::arrays::{self, Array, Arrays, Order};
 use super::numbers::Number;
 use super::units::WavelengthUnit;
-use super::{DatasetError, MAX_BYTES, MAX_VALUES, files};
+use super::{DatasetError, MAX_BYTES, MAX_VALUES, files, npy};
+use crate::plain_file;
 
 /// Largest number of arrays and of chunks of an array that are looked at.
 const MAX_ARRAYS: usize = 2000;
@@ -16,6 +18,9 @@ const MAX_CHUNKS: usize = 1 << 20;
 
 /// Largest file of JSON.
 const MAX_JSON: u64 = 64 << 20;
+
+/// Number of values of a chunk that are read at a time.
+const PART: usize = 8192;
 
 /// Whether a folder is a store.
 pub(super) fn is_store(folder: &Path) -> bool {
@@ -132,7 +137,6 @@ struct Layout {
     packing: Packing,
     /// Whether the last side of a chunk runs slowest.
     is_fortran: bool,
-    fill: f64,
     prefix: &'static str,
     separator: char,
     unit: Option<WavelengthUnit>,
@@ -142,14 +146,6 @@ struct Layout {
 
 fn sides(value: &Value) -> Option<Vec<usize>> {
     value.as_array()?.iter().map(|side| side.as_u64().and_then(|side| usize::try_from(side).ok())).collect()
-}
-
-/// A number of JSON, where names stand for those that JSON has not.
-fn fill(value: &Value) -> f64 {
-    match value {
-        Value::String(text) => text.parse().unwrap_or(f64::NAN),
-        value => value.as_f64().unwrap_or(f64::NAN),
-    }
 }
 
 impl Layout {
@@ -179,7 +175,6 @@ impl Layout {
             number,
             packing,
             is_fortran: false,
-            fill: fill(&node["fill_value"]),
             prefix,
             separator: separator.unwrap_or(default),
             unit: None,
@@ -210,7 +205,6 @@ impl Layout {
             number,
             packing,
             is_fortran: node["order"] == "F",
-            fill: fill(&node["fill_value"]),
             prefix: "",
             separator: separator.unwrap_or('.'),
             unit: None,
@@ -242,10 +236,10 @@ impl Layout {
                 }
             };
         }
-        let bytes = self.chunk.iter().try_fold(self.number.bytes, |product, side| product.checked_mul(*side));
-        match bytes {
-            Some(bytes) if bytes as u64 <= MAX_BYTES => Ok(Some(self)),
-            _ => Err(format!("its chunks of {:?} are more than 512 MiB", self.chunk)),
+        let values = self.chunk.iter().try_fold(1usize, |product, side| product.checked_mul(*side));
+        match values {
+            Some(values) if values <= MAX_VALUES => Ok(Some(self)),
+            _ => Err(format!("its chunks of {:?} are more than {MAX_VALUES} values", self.chunk)),
         }
     }
 
@@ -263,16 +257,14 @@ impl Layout {
             ));
         }
         *left -= count;
-        // An array of fill alone is no measurement, and takes no file.
-        let mut values = vec![self.fill; count];
+        let mut values = vec![0.0; count];
         let mut present = 0;
         let mut at = vec![0; grid.len()];
         for _ in 0..chunks.unwrap_or(0) {
             let path = folder.join(self.key(&at));
             if path.is_file() {
                 present += 1;
-                let chunk = self.unpack(&path)?;
-                self.place(&at, &chunk, &mut values);
+                self.read_chunk(&path, &at, &mut values)?;
             }
             for side in (0..at.len()).rev() {
                 at[side] += 1;
@@ -282,6 +274,7 @@ impl Layout {
                 at[side] = 0;
             }
         }
+        // What a missing chunk is filled with is no measurement.
         let missing = chunks.unwrap_or(0) - present;
         if missing > 0 && count > 0 {
             return Err(Fault::Reason(format!(
@@ -289,11 +282,13 @@ impl Layout {
                 present + missing
             )));
         }
-        for value in &mut values {
-            if self.missing.contains(value) {
-                *value = f64::NAN;
+        if !self.missing.is_empty() || self.scale != [None; 2] {
+            for value in &mut values {
+                if self.missing.contains(value) {
+                    *value = f64::NAN;
+                }
+                *value = *value * self.scale[0].unwrap_or(1.0) + self.scale[1].unwrap_or(0.0);
             }
-            *value = *value * self.scale[0].unwrap_or(1.0) + self.scale[1].unwrap_or(0.0);
         }
         let sides = self.shape.iter().rev().copied().collect();
         Ok(Array { name: name.to_owned(), sides, values, unit: self.unit })
@@ -309,54 +304,76 @@ impl Layout {
         }
     }
 
-    /// Values of a chunk.
-    fn unpack(&self, path: &Path) -> Result<Vec<f64>, Fault> {
-        let packed = files::read_capped(path, MAX_BYTES)?;
-        let count: usize = self.chunk.iter().product();
-        let size = count * self.number.bytes;
-        let cap = size as u64 + 1;
-        let mut bytes = Vec::new();
-        let unpacked = match self.packing {
-            Packing::Plain => {
-                bytes = packed;
-                Ok(0)
-            }
-            Packing::Gzip => {
-                flate2::read::GzDecoder::new(packed.as_slice()).take(cap).read_to_end(&mut bytes)
-            }
-            Packing::Zlib => {
-                flate2::read::ZlibDecoder::new(packed.as_slice()).take(cap).read_to_end(&mut bytes)
-            }
-            Packing::Zstd => unzstd(&packed, cap, &mut bytes),
-        };
+    /// Reads a chunk into its place among the values of the array.
+    fn read_chunk(&self, path: &Path, at: &[usize], values: &mut [f64]) -> Result<(), Fault> {
+        let (file, _) = plain_file::open(path, MAX_BYTES).map_err(|error| files::failed(path, error))?;
         let name = || path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        unpacked.map_err(|e| format!("chunk {} is damaged ({e}); copy it again", name()))?;
-        if bytes.len() != size {
-            return Err(Fault::Reason(format!(
-                "chunk {} has {} bytes, not {size}; copy it again",
-                name(),
-                bytes.len()
-            )));
+        let damaged = |error: io::Error| match error.kind() {
+            ErrorKind::UnexpectedEof => format!("chunk {} ends too early; copy it again", name()),
+            _ => format!("chunk {} is damaged ({error}); copy it again", name()),
+        };
+        let mut source = self.unpacked(file).map_err(damaged)?;
+        if self.is_fortran {
+            let chunk = self.number.read_from(&mut source, self.chunk.iter().product()).map_err(damaged)?;
+            let chunk = npy::turned(&self.chunk, &chunk);
+            let mut rest = chunk.as_slice();
+            let next = |count: usize, part: &mut Vec<f64>| {
+                part.extend_from_slice(rest.split_off(..count).unwrap_or_default());
+                Ok(())
+            };
+            self.place(at, next, values).map_err(damaged)?;
+        } else {
+            let mut bytes = vec![0; PART * self.number.bytes];
+            let next = |count: usize, part: &mut Vec<f64>| {
+                let bytes = &mut bytes[..count * self.number.bytes];
+                source.read_exact(bytes)?;
+                self.number.add(bytes, part);
+                Ok(())
+            };
+            self.place(at, next, values).map_err(damaged)?;
         }
-        Ok(self.number.read_all(&bytes))
+        // The sum of a packed chunk stands behind its values.
+        match source.read(&mut [0]).map_err(damaged)? {
+            0 => Ok(()),
+            _ => Err(Fault::Reason(format!("chunk {} is longer than its values; copy it again", name()))),
+        }
     }
 
-    /// Puts the values of a chunk into those of the array.
-    fn place(&self, at: &[usize], chunk: &[f64], values: &mut [f64]) {
+    /// The bytes of the values of a chunk.
+    fn unpacked(&self, file: File) -> io::Result<Box<dyn Read>> {
+        Ok(match self.packing {
+            Packing::Plain => Box::new(BufReader::with_capacity(1 << 16, file)),
+            Packing::Gzip => Box::new(flate2::read::GzDecoder::new(file)),
+            Packing::Zlib => Box::new(flate2::read::ZlibDecoder::new(file)),
+            Packing::Zstd => unzstd(file)?,
+        })
+    }
+
+    /// Puts the values of a chunk, which come in the order of its sides, into those of the array.
+    fn place(
+        &self,
+        at: &[usize],
+        mut next: impl FnMut(usize, &mut Vec<f64>) -> io::Result<()>,
+        values: &mut [f64],
+    ) -> io::Result<()> {
         let sides = self.shape.len();
-        let chunk = match self.is_fortran {
-            true => super::npy::turned(&self.chunk, chunk),
-            false => chunk.to_vec(),
-        };
         let last = self.chunk[sides - 1];
+        let rows: usize = self.chunk[..sides - 1].iter().product();
+        let start = |side: usize, index: &[usize]| at[side] * self.chunk[side] + index[side];
+        let mut part = Vec::with_capacity(PART.min(last));
         let mut index = vec![0; sides];
-        for row in chunk.chunks_exact(last) {
-            let start: Vec<usize> =
-                (0..sides).map(|side| at[side] * self.chunk[side] + index[side]).collect();
-            if (0..sides - 1).all(|side| start[side] < self.shape[side]) {
-                let offset = (0..sides).fold(0, |offset, side| offset * self.shape[side] + start[side]);
-                let length = last.min(self.shape[sides - 1] - start[sides - 1]);
-                values[offset..offset + length].copy_from_slice(&row[..length]);
+        for _ in 0..rows {
+            // A chunk at an end of the array has values that lie beyond it.
+            let is_inside = (0..sides - 1).all(|side| start(side, &index) < self.shape[side]);
+            let offset = (0..sides).fold(0, |offset, side| offset * self.shape[side] + start(side, &index));
+            let length = if is_inside { last.min(self.shape[sides - 1] - at[sides - 1] * last) } else { 0 };
+            for first in (0..last).step_by(PART) {
+                part.clear();
+                next(PART.min(last - first), &mut part)?;
+                let kept = part.len().min(length.saturating_sub(first));
+                if kept > 0 {
+                    values[offset + first..][..kept].copy_from_slice(&part[..kept]);
+                }
             }
             for side in (0..sides - 1).rev() {
                 index[side] += 1;
@@ -366,6 +383,7 @@ impl Layout {
                 index[side] = 0;
             }
         }
+        Ok(())
     }
 }
 
@@ -374,11 +392,11 @@ fn unknown(codec: &str) -> String {
 }
 
 #[cfg(feature = "zstd")]
-fn unzstd(packed: &[u8], cap: u64, bytes: &mut Vec<u8>) -> std::io::Result<usize> {
-    zstd::Decoder::with_buffer(packed)?.take(cap).read_to_end(bytes)
+fn unzstd(file: File) -> io::Result<Box<dyn Read>> {
+    Ok(Box::new(zstd::Decoder::new(file)?))
 }
 
 #[cfg(not(feature = "zstd"))]
-fn unzstd(_: &[u8], _: u64, _: &mut Vec<u8>) -> std::io::Result<usize> {
-    Err(std::io::Error::other("this build leaves out Zstandard: build it with the feature zstd"))
+fn unzstd(_: File) -> io::Result<Box<dyn Read>> {
+    Err(io::Error::other("this build leaves out Zstandard: build it with the feature zstd"))
 }

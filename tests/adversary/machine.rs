@@ -230,13 +230,14 @@ impl<'a> Machine<'a> {
 
     fn sum(&self, left: Word, right: Word) -> Word {
         let (a, b) = (left.float(), right.float());
-        let reorders = self.takes(Liberties::REORDER, a, b);
-        let fuses = self.takes(Liberties::FUSE, a, b);
+        let reorders = || self.takes(Liberties::REORDER, a, b);
+        let fuses = || self.takes(Liberties::FUSE, a, b);
         let value = match (left.made, right.made) {
-            (Made::Sum(p, q), _) if reorders => p + self.flushed(q + b),
-            (_, Made::Sum(p, q)) if reorders => self.flushed(a + p) + q,
-            (_, Made::Product(p, q)) if fuses => p.mul_add(q, a),
-            (Made::Product(p, q), _) if fuses => p.mul_add(q, b),
+            (Made::Unknown, Made::Unknown) => a + b,
+            (Made::Sum(p, q), _) if reorders() => p + self.flushed(q + b),
+            (_, Made::Sum(p, q)) if reorders() => self.flushed(a + p) + q,
+            (_, Made::Product(p, q)) if fuses() => p.mul_add(q, a),
+            (Made::Product(p, q), _) if fuses() => p.mul_add(q, b),
             _ => a + b,
         };
         self.made(value, Made::Sum(a, b))
@@ -245,12 +246,12 @@ impl<'a> Machine<'a> {
     fn product(&self, left: Word, right: Word) -> Word {
         let (a, b) = (left.float(), right.float());
         let value = match (left.made, right.made) {
+            (Made::Unknown, Made::Unknown) => a * b,
             _ if !self.takes(Liberties::REORDER, a, b) => a * b,
             (Made::Product(p, q), _) => p * self.flushed(q * b),
             (_, Made::Product(p, q)) => self.flushed(a * p) * q,
             (Made::Sum(p, q), _) => self.flushed(p * b) + self.flushed(q * b),
             (_, Made::Sum(p, q)) => self.flushed(a * p) + self.flushed(a * q),
-            _ => a * b,
         };
         self.made(value, Made::Product(a, b))
     }
