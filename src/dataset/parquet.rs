@@ -158,6 +158,7 @@ impl Columns {
         let mut sheet = Sheet::new("row");
         let rows =
             self.columns.iter().map(|column| column.values.len().max(column.texts.len())).max().unwrap_or(0);
+        sheet.reserve((rows + 1) * self.columns.len());
         sheet.begin_row(0, false);
         self.columns.iter().for_each(|column| sheet.push(Cell::parse(&column.name, Decimal::Point)));
         sheet.end_row().map_err(|e| e.of(path))?;

@@ -181,7 +181,13 @@ impl Model {
         let basis_correction = orthonormalise(&mut parts.basis)?;
         check_covariance(&parts.weight_covariance)?;
         // Halves that agree to rounding are made to agree exactly, so that a factor of either is the same.
-        parts.weight_covariance = &parts.weight_covariance / 2.0 + parts.weight_covariance.transpose() / 2.0;
+        let given = &parts.weight_covariance;
+        parts.weight_covariance = DMatrix::from_fn(k, k, |row, column| {
+            match (given[(row, column)], given[(column, row)]) {
+                (above, below) if above == below => above, // half a subnormal number may not be one
+                (above, below) => above / 2.0 + below / 2.0,
+            }
+        });
         Ok(Model { parts, basis_correction })
     }
 

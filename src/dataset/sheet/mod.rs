@@ -88,6 +88,11 @@ impl Sheet {
         Sheet { rows: Vec::new(), values: Vec::new(), texts: HashMap::new(), marks: HashMap::new(), row_name }
     }
 
+    /// Makes room for as many cells: as a large table grows, it is moved again and again.
+    pub(super) fn reserve(&mut self, cells: usize) {
+        self.values.reserve_exact(cells.min(MAX_CELLS));
+    }
+
     /// Begins a row.
     pub(super) fn begin_row(&mut self, line: usize, is_comment: bool) {
         self.rows.push(Row { line, start: self.values.len(), cells: 0, is_comment });
