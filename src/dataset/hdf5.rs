@@ -25,7 +25,7 @@ const MAX_DEPTH: usize = 6;
 /// Largest number of arrays that are looked at.
 const MAX_ARRAYS: usize = 2000;
 
-/// What is kept of the parts of a file that describe it: each is a few bytes, and many are read again and again.
+/// Bytes that are kept of the parts that describe a file: each is a few bytes, and many are read again and again.
 const CACHE_BYTES: usize = 1 << 20;
 
 /// Largest ratio of what chunks unpack to, to what they take in the file: that of deflate.

@@ -25,7 +25,7 @@ const BATCH: usize = 1 << 10;
 /// Largest number of words of a column: names of spectra are fewer.
 const MAX_TEXTS: usize = 2_000_000;
 
-/// What the numbers of a column stand for, where it is not what their type says.
+/// Meaning of the numbers of a column, which their type alone does not tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Meaning {
     Itself,
@@ -49,7 +49,7 @@ impl Meaning {
         }
     }
 
-    /// What a number of a column is divided by.
+    /// Divisor of the numbers of a column.
     fn divisor(self) -> f64 {
         match self {
             Meaning::Decimal(digits) => 10f64.powi(digits),
