@@ -194,6 +194,11 @@ for packing in (numcodecs.GZip(), numcodecs.Zlib()):
     shutil.copytree(name, f"sum-{name}")
     refused(f"sum-{name}", "chunk 0.0 is damaged")
     open(chunk, "wb").write(whole)
+# Chunks of more values than any array may have: small in the file, large in memory.
+store = chunked("vast.zarr")
+layout = json.load(open(f"{store}/reflectance/.zarray"))
+json.dump(layout | {"dtype": "|u1", "chunks": [1, 1 << 28]}, open(f"{store}/reflectance/.zarray", "w"))
+refused(store, "are more than", "values")
 for name, change in [("short", lambda chunk: chunk[:-1]), ("long", lambda chunk: chunk + b"x")]:
     for order in "CF":
         store = chunked(f"{name}-{order}.zarr", order=order)

@@ -89,6 +89,7 @@ impl Sheet {
     }
 
     /// Makes room for as many cells: as a large table grows, it is moved again and again.
+    #[cfg(feature = "parquet")]
     pub(super) fn reserve(&mut self, cells: usize) {
         self.values.reserve_exact(cells.min(MAX_CELLS));
     }
