@@ -1,6 +1,7 @@
 //! Parquet: columns of lists, which are spectra with their wavelengths in the file's notes, or columns of numbers, which
 //! are named by wavelengths or stand beside a column of them.
 
+use std::io::{self, Read};
 use std::path::Path;
 
 use bytes::Bytes;
@@ -9,7 +10,7 @@ use parquet::basic::{ConvertedType, LogicalType};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, ByteArrayType, FixedLenByteArray};
 use parquet::errors::ParquetError;
-use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
+use parquet::file::reader::{ChunkReader, FileReader, Length, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 use super::arrays::{self, Array, Arrays, Order};
@@ -69,6 +70,37 @@ struct Column {
     texts: Vec<String>,
 }
 
+/// A source, and a reader of it, whose end is an error: the parser skips what it does not know without a look at whether
+/// any of it is there, and a damaged file may claim two thousand million of it.
+struct Ending<S>(S);
+
+impl<S: Length> Length for Ending<S> {
+    fn len(&self) -> u64 {
+        self.0.len()
+    }
+}
+
+impl<S: ChunkReader> ChunkReader for Ending<S> {
+    type T = Ending<S::T>;
+
+    fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
+        self.0.get_read(start).map(Ending)
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
+        self.0.get_bytes(start, length)
+    }
+}
+
+impl<S: Read> Read for Ending<S> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        match self.0.read(to)? {
+            0 if !to.is_empty() => Err(io::ErrorKind::UnexpectedEof.into()),
+            count => Ok(count),
+        }
+    }
+}
+
 /// Contents of a file, or of several of one set.
 #[derive(Default)]
 pub(super) struct Columns {
@@ -94,7 +126,7 @@ impl Columns {
 
     fn with(mut self, source: impl ChunkReader + 'static) -> Result<Columns, String> {
         let wrong = |error: ParquetError| error.to_string();
-        let reader = SerializedFileReader::new(source).map_err(wrong)?;
+        let reader = SerializedFileReader::new(Ending(source)).map_err(wrong)?;
         let metadata = reader.metadata();
         for note in metadata.file_metadata().key_value_metadata().into_iter().flatten() {
             match (note.key.as_str(), &note.value) {
