@@ -147,7 +147,7 @@ impl Walk {
         {
             return Ok(());
         }
-        let mut values = if size > 8 { Vec::new() } else { numbers(set).map_err(placed)? };
+        let mut values = numbers(set).map_err(placed)?;
         if values.is_empty() && count > 0 {
             return Err(Fault::Other(format!(
                 "{name:?} holds numbers of a type that is not read: write it as float64"
@@ -246,6 +246,7 @@ fn numbers(set: &Dataset) -> Result<Vec<f64>, Error> {
             let number = Number { kind: NumberKind::Float, bytes: 2, big_endian };
             Ok(number.read_all(&set.read_raw()?))
         }
+        datatype if datatype.type_size() > 8 => Ok(Vec::new()),
         _ => set.read_f64(),
     }
 }

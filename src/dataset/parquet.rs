@@ -8,7 +8,7 @@ use bytes::Bytes;
 use half::f16;
 use parquet::basic::{ConvertedType, LogicalType};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::{ByteArray, ByteArrayType, FixedLenByteArray};
+use parquet::data_type::{ByteArray, DataType, FixedLenByteArray};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{ChunkReader, FileReader, Length, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
@@ -223,49 +223,21 @@ pub(super) fn read(path: &Path, source: Source, options: &ReadOptions) -> Result
 /// Adds the values of a part of a column.
 fn read_column(
     reader: ColumnReader,
-    (max_def, max_rep): (i16, i16),
+    levels: (i16, i16),
     meaning: Meaning,
     column: &mut Column,
 ) -> Result<(), String> {
-    let (mut defs, mut reps) = (Vec::new(), Vec::new());
     let mut lists = Lists { width: column.width, ..Lists::default() };
-    let values = &mut column.values;
+    let (name, values) = (&column.name, &mut column.values);
+    let check = |count: usize, reps: &[i16]| match reps.iter().all(|rep| lists.add(*rep == 0)) {
+        false => Err(uneven(name)),
+        true if count > MAX_VALUES => Err(super::too_many(count)),
+        true => Ok(()),
+    };
     macro_rules! all {
-        ($reader:expr, $value:expr) => {{
-            let mut reader = $reader;
-            let mut batch = Vec::new();
-            loop {
-                defs.clear();
-                reps.clear();
-                batch.clear();
-                let (records, _, levels) = reader
-                    .read_records(
-                        BATCH,
-                        (max_def > 0).then_some(&mut defs),
-                        (max_rep > 0).then_some(&mut reps),
-                        &mut batch,
-                    )
-                    .map_err(|e| e.to_string())?;
-                match max_def {
-                    0 => values.extend(batch.iter().map($value)),
-                    // Nulls have a level and no value.
-                    _ => {
-                        let mut there = batch.iter().map($value);
-                        let mut next = || there.next().unwrap_or(f64::NAN);
-                        values.extend(defs.iter().map(|def| if *def == max_def { next() } else { f64::NAN }));
-                    }
-                }
-                if !reps.iter().all(|rep| lists.add(*rep == 0)) {
-                    return Err(uneven(&column.name));
-                }
-                if records == 0 && levels == 0 {
-                    break;
-                }
-                if values.len() > MAX_VALUES {
-                    return Err(super::too_many(values.len()));
-                }
-            }
-        }};
+        ($reader:expr, $number:expr) => {
+            read_values($reader, levels, values, |value| value.map_or(f64::NAN, $number), check)?
+        };
     }
     match reader {
         ColumnReader::FloatColumnReader(reader) => all!(reader, |v: &f32| f64::from(*v)),
@@ -283,25 +255,36 @@ fn read_column(
                 v.data().first_chunk().map_or(f64::NAN, |bytes| f16::from_le_bytes(*bytes).to_f64())
             });
         }
-        ColumnReader::ByteArrayColumnReader(reader) => return read_texts(reader, max_def, max_rep, column),
+        ColumnReader::ByteArrayColumnReader(reader) => {
+            let check = |count: usize, _: &[i16]| match count > MAX_TEXTS {
+                true => Err(format!("{name:?} has more than {MAX_TEXTS} words: leave it out")),
+                false => Ok(()),
+            };
+            let text = |word: Option<&ByteArray>| {
+                word.map_or(String::new(), |bytes| String::from_utf8_lossy(bytes.data()).into_owned())
+            };
+            return read_values(reader, levels, &mut column.texts, text, check);
+        }
         // Dates, truth values and the like are no spectra.
         _ => {
             column.texts.push(String::new());
             return Ok(());
         }
     }
-    if max_rep > 0 && lists.values > 0 {
+    if lists.values > 0 {
         column.width = Some(lists.one_width().ok_or_else(|| uneven(&column.name))?);
     }
     Ok(())
 }
 
-/// Adds the words of a part of a column.
-fn read_texts(
-    mut reader: ColumnReaderImpl<ByteArrayType>,
-    max_def: i16,
-    max_rep: i16,
-    column: &mut Column,
+/// Adds the values of a part of a column, of those too that are null, which have a level and nothing else; `check` sees how
+/// many there are, and the levels at which lists begin.
+fn read_values<T: DataType, V>(
+    mut reader: ColumnReaderImpl<T>,
+    (max_def, max_rep): (i16, i16),
+    values: &mut Vec<V>,
+    value: impl Fn(Option<&T::T>) -> V,
+    mut check: impl FnMut(usize, &[i16]) -> Result<(), String>,
 ) -> Result<(), String> {
     let (mut defs, mut reps, mut batch) = (Vec::new(), Vec::new(), Vec::new());
     loop {
@@ -316,22 +299,17 @@ fn read_texts(
                 &mut batch,
             )
             .map_err(|e| e.to_string())?;
-        let mut there =
-            batch.iter().map(|bytes: &ByteArray| String::from_utf8_lossy(bytes.data()).into_owned());
+        let mut there = batch.iter();
         match max_def {
-            0 => column.texts.extend(there),
+            0 => values.extend(there.map(|each| value(Some(each)))),
             _ => {
-                let mut next = || there.next().unwrap_or_default();
-                column
-                    .texts
-                    .extend(defs.iter().map(|def| if *def == max_def { next() } else { String::new() }));
+                let mut next = |def: &i16| if *def == max_def { there.next() } else { None };
+                values.extend(defs.iter().map(|def| value(next(def))));
             }
         }
+        check(values.len(), &reps)?;
         if records == 0 && levels == 0 {
             return Ok(());
-        }
-        if column.texts.len() > MAX_TEXTS {
-            return Err(format!("{:?} has more than {MAX_TEXTS} words: leave it out", column.name));
         }
     }
 }
