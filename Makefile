@@ -85,7 +85,7 @@ fuzz:
 	mkdir -p fuzz/artifacts
 	for target in $(TARGETS); do mkdir -p target/fuzz/corpus/$$target; \
 		target/fuzz/$(HOST)/release/$$target target/fuzz/corpus/$$target fuzz/corpus/$$target \
-			-max_total_time=$(SECONDS) -timeout=2 -rss_limit_mb=1024 -malloc_limit_mb=1024 -max_len=16384 \
+			-max_total_time=$(SECONDS) -timeout=2 -rss_limit_mb=1024 -max_len=16384 \
 			-print_final_stats=1 -artifact_prefix=fuzz/artifacts/$$target- || exit 1; done
 
 # Small changes of the code, of which a test must notice each: a sample of those in a room, as in `make mutants ROOM=cover`.

@@ -1,6 +1,7 @@
 //! What each target does with its bytes. The corpora in `corpus/` are replayed by `tests/corpus.rs` of the crate itself,
 //! which includes this file.
 
+use std::alloc::System;
 use std::ffi::OsString;
 use std::fs;
 use std::io::{Cursor, Write};
@@ -9,6 +10,11 @@ use std::path::{Path, PathBuf};
 use spectroll::output::{SetAudit, Sidecar};
 use spectroll::scene::Scene;
 use spectroll::{Dataset, Extrapolation, Grid, Model, RecipeSettings, Table};
+
+/// Memory that no input may take more of, also where it is never touched: the allocation ends the run. libFuzzer's own
+/// limit sees nothing without a sanitizer.
+#[global_allocator]
+static MEMORY: cap::Cap<System> = cap::Cap::new(System, 1 << 30);
 
 /// A folder in memory of this process, for readers that want a file.
 fn folder() -> PathBuf {

@@ -144,6 +144,12 @@ lists[3][4] = None
 gap = R.copy()
 gap[3, 4] = np.nan
 right(parquet("gap.parquet", {"spectra": lists}, waves), gap)
+for packing in ["none", "snappy", "zstd"]:
+    frame.to_parquet(f"{packing}.parquet", compression=packing)
+    right(f"{packing}.parquet")
+for packing in ["gzip", "Brotli", "LZ4"]:
+    frame.to_parquet(f"{packing}.parquet", compression=packing.lower())
+    refused(f"{packing}.parquet", f"packed by {packing}", 'compression="snappy"')
 for name, at in [("first", 0), ("inner", 9), ("last", 19)]:
     for what, odd in [("twice", lists[0] * 2), ("short", lists[0][:-1]), ("empty", []), ("none", None)]:
         uneven = lists[:at] + [odd] + lists[at + 1 :]

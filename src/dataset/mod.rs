@@ -31,6 +31,8 @@ mod spdx;
 mod spreadsheet;
 mod table;
 mod text;
+#[cfg(feature = "parquet")]
+mod thrift;
 mod units;
 mod zarr;
 

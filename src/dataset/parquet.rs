@@ -6,7 +6,7 @@ use std::path::Path;
 
 use bytes::Bytes;
 use half::f16;
-use parquet::basic::{ConvertedType, LogicalType};
+use parquet::basic::{Compression, ConvertedType, LogicalType};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType, FixedLenByteArray};
 use parquet::errors::ParquetError;
@@ -17,11 +17,17 @@ use super::arrays::{self, Array, Arrays, Order};
 use super::files::Source;
 use super::reading::{Decimal, ReadOptions, Reading};
 use super::sheet::{Cell, Sheet};
-use super::{DatasetError, MAX_BYTES, MAX_VALUES, text};
+use super::{DatasetError, MAX_BYTES, MAX_VALUES, text, thrift};
 use crate::caught::caught;
 
 /// Records that are read at a time: spectra, where a column is one of lists.
 const BATCH: usize = 1 << 10;
+
+/// Number of bytes at the end of a file: the length of its description, and `PAR1`.
+const FOOT: u64 = 8;
+
+/// Number of the field of a page's header that holds its unpacked size.
+const UNPACKED_SIZE: i64 = 2;
 
 /// Largest number of words of a column: names of spectra are fewer.
 const MAX_TEXTS: usize = 2_000_000;
@@ -71,8 +77,24 @@ struct Column {
 }
 
 /// A source, and a reader of it, whose end is an error: the parser skips what it does not know without a look at whether
-/// any of it is there, and a damaged file may claim two thousand million of it.
+/// any of it is there, and a damaged file may claim two thousand million of it. What it parses is walked before.
 struct Ending<S>(S);
+
+impl<S: ChunkReader> Ending<S> {
+    /// A source, whose description of the file is walked.
+    fn new(source: S) -> Result<Self, ParquetError> {
+        let mut foot = [0; FOOT as usize];
+        let length = source.len();
+        let ending = Ending(source);
+        let start = length.checked_sub(FOOT).ok_or(cut_short())?;
+        ending.0.get_read(start)?.read_exact(&mut foot)?;
+        let (size, _) = foot.split_first_chunk().expect("it has 8 bytes");
+        let size = u64::from(u32::from_le_bytes(*size));
+        let start = start.checked_sub(size).ok_or(cut_short())?;
+        thrift::walk(Ending(ending.0.get_read(start)?).take(size))?;
+        Ok(ending)
+    }
+}
 
 impl<S: Length> Length for Ending<S> {
     fn len(&self) -> u64 {
@@ -83,7 +105,16 @@ impl<S: Length> Length for Ending<S> {
 impl<S: ChunkReader> ChunkReader for Ending<S> {
     type T = Ending<S::T>;
 
+    /// A reader from there on: of a page, or of the last bytes.
     fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
+        if start + FOOT != self.len() {
+            let header = thrift::walk(Ending(self.0.get_read(start)?))?;
+            let size = header.iter().find(|(number, _)| *number == UNPACKED_SIZE).map(|(_, size)| *size);
+            // As much is made room for before anything is unpacked.
+            if size.is_none_or(|size| !(0..=MAX_BYTES.cast_signed()).contains(&size)) {
+                return Err(ParquetError::General("a page that is too large".to_owned()));
+            }
+        }
         self.0.get_read(start).map(Ending)
     }
 
@@ -125,8 +156,7 @@ impl Columns {
     }
 
     fn with(mut self, source: impl ChunkReader + 'static) -> Result<Columns, String> {
-        let wrong = |error: ParquetError| error.to_string();
-        let reader = SerializedFileReader::new(Ending(source)).map_err(wrong)?;
+        let reader = SerializedFileReader::new(Ending::new(source).map_err(damaged)?).map_err(damaged)?;
         let metadata = reader.metadata();
         for note in metadata.file_metadata().key_value_metadata().into_iter().flatten() {
             match (note.key.as_str(), &note.value) {
@@ -142,12 +172,14 @@ impl Columns {
             let meaning = Meaning::of(description);
             let mut column = Column { name, values: Vec::new(), width: None, texts: Vec::new() };
             for group in 0..metadata.num_row_groups() {
-                if metadata.row_group(group).column(index).uncompressed_size() as u64 > MAX_BYTES {
+                let part = metadata.row_group(group).column(index);
+                unpacked(part.compression())?;
+                if part.uncompressed_size() as u64 > MAX_BYTES {
                     return Err("it holds more than 512 MiB (unpacked): split it".to_owned());
                 }
-                let group = reader.get_row_group(group).map_err(wrong)?;
+                let group = reader.get_row_group(group).map_err(damaged)?;
                 let levels = (description.max_def_level(), description.max_rep_level());
-                let column_reader = group.get_column_reader(index).map_err(wrong)?;
+                let column_reader = group.get_column_reader(index).map_err(damaged)?;
                 read_column(column_reader, levels, meaning, &mut column)?;
                 if self.values + column.values.len() > MAX_VALUES {
                     return Err(super::too_many(self.values + column.values.len()));
@@ -298,7 +330,7 @@ fn read_values<T: DataType, V>(
                 (max_rep > 0).then_some(&mut reps),
                 &mut batch,
             )
-            .map_err(|e| e.to_string())?;
+            .map_err(damaged)?;
         let mut there = batch.iter();
         match max_def {
             0 => values.extend(there.map(|each| value(Some(each)))),
@@ -312,6 +344,33 @@ fn read_values<T: DataType, V>(
             return Ok(());
         }
     }
+}
+
+/// Refuses a packing that is not read here.
+fn unpacked(packing: Compression) -> Result<(), String> {
+    let (name, may) = match packing {
+        Compression::UNCOMPRESSED | Compression::SNAPPY => return Ok(()),
+        Compression::ZSTD(_) => ("zstd", cfg!(feature = "zstd")),
+        Compression::GZIP(_) => ("gzip", false),
+        Compression::BROTLI(_) => ("Brotli", false),
+        Compression::LZ4 | Compression::LZ4_RAW => ("LZ4", false),
+        Compression::LZO => ("LZO", false),
+    };
+    match may {
+        true => Ok(()),
+        false => Err(format!("it is packed by {name}: write it with compression=\"snappy\"")),
+    }
+}
+
+fn cut_short() -> ParquetError {
+    ParquetError::External(Box::new(io::Error::from(io::ErrorKind::UnexpectedEof)))
+}
+
+/// The reason of a refusal of bytes that do not make a file of Parquet.
+fn damaged(error: ParquetError) -> String {
+    let reason = error.to_string();
+    let (_, reason) = reason.split_once(": ").unwrap_or(("", &reason));
+    format!("it is damaged ({reason}); copy it again")
 }
 
 fn uneven(name: &str) -> String {
