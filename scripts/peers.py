@@ -1,11 +1,12 @@
 """The same draws as one would write them in Python: spectra of a Gaussian model, kept where all bands are physical.
 
-    peers.py MODEL.json numpy|numba [COUNT [OUT.npy]]
+    peers.py MODEL.json numpy|numba|torch [COUNT [OUT.npy]]
 
 With COUNT it prints million spectra a second, the best of three runs; with OUT.npy it fills that file once, and prints
 nothing. Without, it answers requests: for each line "COUNT SEED" on standard input it draws, in blocks, and writes the
 blocks, each a line "ROWS" and the values in 32 bits, and at last a line "0 SECONDS CANDIDATES". The first line that it
-writes describes it, as JSON. Only the drawing is timed.
+writes describes it, as JSON. Only the drawing is timed. Torch draws on the graphics card, if there is one, and with
+COUNT leaves the spectra there.
 """
 
 import json
@@ -30,19 +31,18 @@ class Model:
         self.limit = np.float32(1 if model["kind"] == "reflectance" else np.inf)
 
 
-def with_numpy(model):
-    generator, shares = np.random.Generator(np.random.SFC64(0)), [1, 1]
+def in_blocks(draw, set_seed, block):
+    """Fills an array with what is kept of blocks of candidates. `draw` makes spectra, and numbers those that are physical."""
+    shares = [1, 1]
 
     def fill(out, seed):
-        nonlocal generator
         if seed is not None:
-            generator = np.random.Generator(np.random.SFC64(seed))
+            set_seed(seed)
         done = candidates = 0
         while done < len(out):
             # As many candidates as are likely to be enough.
-            count = min(BLOCK, int(1.05 * (len(out) - done) * shares[1] / shares[0]) + 16)
-            spectra = generator.standard_normal((count, len(model.gain)), dtype=np.float32) @ model.gain + model.mean
-            kept = np.flatnonzero(((spectra > 0) & (spectra < model.limit)).all(axis=1))
+            count = min(block, int(1.05 * (len(out) - done) * shares[1] / shares[0]) + 16)
+            spectra, kept = draw(count)
             shares[0] += len(kept)
             shares[1] += count
             kept = kept[: len(out) - done]
@@ -52,6 +52,43 @@ def with_numpy(model):
         return candidates
 
     return fill
+
+
+def with_numpy(model):
+    generator = None
+
+    def set_seed(seed):
+        nonlocal generator
+        generator = np.random.Generator(np.random.SFC64(seed))
+
+    def draw(count):
+        spectra = generator.standard_normal((count, len(model.gain)), dtype=np.float32) @ model.gain + model.mean
+        return spectra, np.flatnonzero(((spectra > 0) & (spectra < model.limit)).all(axis=1))
+
+    set_seed(0)
+    return in_blocks(draw, set_seed, BLOCK), lambda shape: np.empty(shape, np.float32)
+
+
+def with_torch(model):
+    on_card = torch.cuda.is_available()
+    device = torch.device("cuda" if on_card else "cpu")
+    mean, gain = torch.from_numpy(model.mean).to(device), torch.from_numpy(model.gain).to(device)
+    generator, limit = torch.Generator(device), float(model.limit)
+
+    def draw(count):
+        weights = torch.randn(count, len(gain), generator=generator, device=device)
+        spectra = torch.addmm(mean, weights, gain)
+        return spectra, ((spectra > 0) & (spectra < limit)).all(dim=1).nonzero()[:, 0]
+
+    fill = in_blocks(draw, generator.manual_seed, 16 * BLOCK if on_card else BLOCK)
+
+    def fill_and_wait(out, seed):
+        candidates = fill(torch.as_tensor(out), seed)
+        if on_card:
+            torch.cuda.synchronize()
+        return candidates
+
+    return fill_and_wait, lambda shape: torch.empty(shape, device=device)
 
 
 def with_numba(model):
@@ -89,7 +126,7 @@ def with_numba(model):
     def fill(out, seed):
         return int(fill_in_parallel(out, -1 if seed is None else seed, model.mean, model.gain, limit))
 
-    return fill
+    return fill, lambda shape: np.empty(shape, np.float32)
 
 
 def say(text):
@@ -104,9 +141,9 @@ def serve(model, fill, peer):
     bands = len(model.mean)
     fill(np.empty((1, bands), np.float32), 1)
     first = time.perf_counter() - start
-    module = {"numpy": np, "numba": sys.modules.get("numba")}[peer]
+    module = sys.modules[peer]
     python = ".".join(map(str, sys.version_info[:3]))
-    threads = numba.get_num_threads() if peer == "numba" else 1
+    threads = 1 if peer == "numpy" else module.get_num_threads()
     say(json.dumps({"version": module.__version__, "python": python, "threads": threads, "first_draw": first}))
     buffer = np.empty((BLOCK, bands), np.float32)
     for line in sys.stdin:
@@ -126,7 +163,7 @@ def serve(model, fill, peer):
 def main():
     path, peer, *rest = sys.argv[1:]
     model = Model(path)
-    fill = {"numpy": with_numpy, "numba": with_numba}[peer](model)
+    fill, empty = {"numpy": with_numpy, "numba": with_numba, "torch": with_torch}[peer](model)
     if not rest:
         serve(model, fill, peer)
         return
@@ -136,10 +173,10 @@ def main():
         fill(out, 1)
         out.flush()
         return
-    fill(np.empty((BLOCK, shape[1]), np.float32), 1)  # compiles, and warms up
+    fill(empty((BLOCK, shape[1])), 1)  # compiles, and warms up
     rates = []
     for _ in range(3):
-        out = np.empty(shape, np.float32)
+        out = empty(shape)
         start = time.perf_counter()
         fill(out, 1)
         rates.append(shape[0] / (time.perf_counter() - start) / 1e6)
@@ -151,6 +188,8 @@ try:
 
     if sys.argv[2:3] == ["numba"]:
         import numba
+    if sys.argv[2:3] == ["torch"]:
+        import torch
 except ImportError as error:
     if sys.argv[3:]:
         sys.exit(str(error))

@@ -106,6 +106,6 @@ pub use threads::ThreadError;
 // What stands in signatures, so that hosts take the same versions.
 pub use wgsl::{
     Arithmetic, ArithmeticTrait, Binding, BindingRole, ComputeShader, Dialect, Indexing, ModuleOptions,
-    ShaderVariant, TableStorage, WgslError,
+    ShaderVariant, Stores, TableStorage, WgslError,
 };
 pub use {half, nalgebra, rand, wgpu};

@@ -4,6 +4,8 @@
 
 mod buffers;
 
+use std::sync::OnceLock;
+
 use buffers::read;
 use spectroll::{
     Engine, EngineChoice, EngineError, Layout, Model, ProposalKind, Quantity, Recipe, Sampler, SamplerError,
@@ -18,6 +20,12 @@ mod inline;
 mod scene;
 use embed::host;
 
+/// The device of a host, one for all tests.
+fn device() -> (wgpu::Device, wgpu::Queue) {
+    static DEVICE: OnceLock<(wgpu::Device, wgpu::Queue)> = OnceLock::new();
+    DEVICE.get_or_init(host::device).clone()
+}
+
 fn surfaces() -> Recipe {
     let model = Model::builtin("munsell-vrhel").expect("it is built in");
     Recipe::builder(&model)
@@ -28,7 +36,7 @@ fn surfaces() -> Recipe {
 
 #[test]
 fn several_ranges_in_one_encoder_do_not_clash() {
-    let host = host::device();
+    let host = device();
     let recipe = surfaces();
     let sampler = Sampler::new(&host.0, &recipe).expect("two buffers are few");
     let ranges = [Stream::new(1).draws(0..1001), Stream::named(2, "other").draws(500..600)];
@@ -50,7 +58,7 @@ fn several_ranges_in_one_encoder_do_not_clash() {
 /// Frame after frame in the same buffers, with fewer draws at times.
 #[test]
 fn a_host_draws_anew_in_each_frame() {
-    let host = host::device();
+    let host = device();
     let recipe = surfaces();
     let sampler = Sampler::new(&host.0, &recipe).expect("two buffers are few");
     let mut prepared = sampler.prepare(&host.0, Stream::new(1).draws(0..100)).expect("they are few");
@@ -74,7 +82,7 @@ fn a_host_draws_anew_in_each_frame() {
 
 #[test]
 fn what_does_not_fit_is_refused_with_the_limit() {
-    let (device, _) = host::device();
+    let (device, _) = device();
     let sampler = Sampler::new(&device, &surfaces()).expect("two buffers are few");
     let limits = device.limits();
     let largest = sampler.max_count(&limits);
@@ -312,7 +320,7 @@ fn walls_have_the_colours_of_the_cpu() {
 fn rows_are_padded_for_vec4() {
     let model = Model::builtin("munsell-vrhel").expect("it is built in");
     let recipe = Recipe::builder(&model).layout(Layout::PaddedRows).build().expect("it can be drawn");
-    let host = host::device();
+    let host = device();
     let sampler = Sampler::new(&host.0, &recipe).expect("one buffer is few");
     let prepared = sampler.prepare(&host.0, Stream::new(3).draws(0..10)).expect("they are few");
     let mut encoder = host.0.create_command_encoder(&Default::default());

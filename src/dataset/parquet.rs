@@ -17,7 +17,8 @@ use super::arrays::{self, Array, Arrays, Order};
 use super::files::Source;
 use super::reading::{Decimal, ReadOptions, Reading};
 use super::sheet::{Cell, Sheet};
-use super::{DatasetError, MAX_BYTES, MAX_VALUES, text, thrift};
+use super::thrift::{self, Field};
+use super::{DatasetError, MAX_BYTES, MAX_VALUES, text};
 use crate::caught::caught;
 
 /// Records that are read at a time: spectra, where a column is one of lists.
@@ -26,8 +27,14 @@ const BATCH: usize = 1 << 10;
 /// Number of bytes at the end of a file: the length of its description, and `PAR1`.
 const FOOT: u64 = 8;
 
-/// Number of the field of a page's header that holds its unpacked size.
-const UNPACKED_SIZE: i64 = 2;
+/// Fields of a page's header: its type, its unpacked size, and the numbers of values of each type of page.
+const PAGE_TYPE: Field = (None, 1);
+const UNPACKED_SIZE: Field = (None, 2);
+const DATA_VALUES: [Field; 2] = [(Some(5), 1), (Some(8), 1)];
+const DICTIONARY_VALUES: Field = (Some(7), 1);
+
+/// Type of a page: a dictionary.
+const DICTIONARY: i64 = 2;
 
 /// Largest number of words of a column: names of spectra are fewer.
 const MAX_TEXTS: usize = 2_000_000;
@@ -108,12 +115,7 @@ impl<S: ChunkReader> ChunkReader for Ending<S> {
     /// A reader from there on: of a page, or of the last bytes.
     fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
         if start + FOOT != self.len() {
-            let header = thrift::walk(Ending(self.0.get_read(start)?))?;
-            let size = header.iter().find(|(number, _)| *number == UNPACKED_SIZE).map(|(_, size)| *size);
-            // As much is made room for before anything is unpacked.
-            if size.is_none_or(|size| !(0..=MAX_BYTES.cast_signed()).contains(&size)) {
-                return Err(ParquetError::General("a page that is too large".to_owned()));
-            }
+            check_page(&thrift::walk(Ending(self.0.get_read(start)?))?)?;
         }
         self.0.get_read(start).map(Ending)
     }
@@ -343,6 +345,28 @@ fn read_values<T: DataType, V>(
         if records == 0 && levels == 0 {
             return Ok(());
         }
+    }
+}
+
+/// Refuses a page that claims more than it can hold: room is made for its bytes and for the values of a dictionary before
+/// any is read.
+fn check_page(header: &[(Field, i64)]) -> Result<(), ParquetError> {
+    let of = |field| header.iter().find(|(found, _)| *found == field).map(|(_, value)| *value);
+    let is_within = |count: Option<i64>, most: usize| {
+        count.is_none_or(|count| usize::try_from(count).is_ok_and(|count| count <= most))
+    };
+    let size = of(UNPACKED_SIZE);
+    let fits = size.is_some()
+        && is_within(size, MAX_BYTES as usize)
+        && DATA_VALUES.into_iter().all(|field| is_within(of(field), MAX_VALUES))
+        && is_within(of(DICTIONARY_VALUES), MAX_TEXTS.min(size.unwrap_or(0) as usize))
+        && match of(PAGE_TYPE) {
+            Some(DICTIONARY) => of(DICTIONARY_VALUES).is_some(),
+            _ => DATA_VALUES.into_iter().any(|field| of(field).is_some()),
+        };
+    match fits {
+        true => Ok(()),
+        false => Err(ParquetError::General("a page that is too large".to_owned())),
     }
 }
 

@@ -14,13 +14,33 @@ const MAX_DEPTH: u32 = 64;
 const I16: u8 = 4;
 const I32: u8 = 5;
 const I64: u8 = 6;
+const STRUCTURE: u8 = 12;
 
-/// Walks a structure, to its end. Returns the numbers and values of its fields of 32 bits.
-pub(super) fn walk(source: impl Read) -> io::Result<Vec<(i64, i64)>> {
+/// Field of 32 bits: its number, and where it is one of a structure within, that of the structure before it.
+pub(super) type Field = (Option<i64>, i64);
+
+/// Walks a structure, to its end. Returns the fields of 32 bits, with their values, of it and of the structures that are
+/// its own fields.
+pub(super) fn walk(source: impl Read) -> io::Result<Vec<(Field, i64)>> {
     let mut walk = Walk { source };
-    let mut integers = Vec::new();
-    walk.structure(MAX_DEPTH, |number, value| integers.push((number, value)))?;
-    Ok(integers)
+    let mut found = Vec::new();
+    let mut number = 0;
+    while let Some(kind) = walk.field(&mut number)? {
+        match kind {
+            I32 => found.push(((None, number), walk.integer()?)),
+            STRUCTURE => {
+                let mut inner = 0;
+                while let Some(kind) = walk.field(&mut inner)? {
+                    match kind {
+                        I32 => found.push(((Some(number), inner), walk.integer()?)),
+                        kind => walk.value(kind, MAX_DEPTH - 2)?,
+                    }
+                }
+            }
+            kind => walk.value(kind, MAX_DEPTH - 1)?,
+        }
+    }
+    Ok(found)
 }
 
 struct Walk<R> {
@@ -28,30 +48,24 @@ struct Walk<R> {
 }
 
 impl<R: Read> Walk<R> {
-    /// Walks a structure; `found` is told of its own fields of 32 bits.
-    fn structure(&mut self, depth: u32, mut found: impl FnMut(i64, i64)) -> io::Result<()> {
-        let mut number = 0;
-        loop {
-            let head = self.byte()?;
-            match (head >> 4, head & 15) {
-                (_, 0) => return Ok(()),
-                (0, _) => number = self.integer()?,
-                (step, _) => number += i64::from(step),
-            }
-            match head & 15 {
-                I32 => found(number, self.integer()?),
-                1 | 2 => {}
-                kind => self.value(kind, depth - 1)?,
-            }
+    /// Walks the head of a field. Returns its type; `None` at the end of the structure.
+    fn field(&mut self, number: &mut i64) -> io::Result<Option<u8>> {
+        let head = self.byte()?;
+        match (head >> 4, head & 15) {
+            (_, 0) => return Ok(None),
+            (0, _) => *number = self.integer()?,
+            (step, _) => *number = number.wrapping_add(step.into()),
         }
+        Ok(Some(head & 15))
     }
 
-    /// Walks a value of a field, a list or a map.
+    /// Walks a value of a field.
     fn value(&mut self, kind: u8, depth: u32) -> io::Result<()> {
         if depth == 0 {
             return Err(wrong("structures within structures without end"));
         }
         match kind {
+            1 | 2 => Ok(()),
             3 => self.skip(1),
             I16 | I32 | I64 => self.integer().map(|_| ()),
             7 => self.skip(8),
@@ -74,12 +88,19 @@ impl<R: Read> Walk<R> {
                     })
                 }
             },
-            12 => self.structure(depth, |_, _| ()),
+            STRUCTURE => {
+                let mut number = 0;
+                while let Some(kind) = self.field(&mut number)? {
+                    self.value(kind, depth - 1)?;
+                }
+                Ok(())
+            }
             13 => self.skip(16),
             _ => Err(wrong("a type that Thrift does not have")),
         }
     }
 
+    /// Walks a value of a list or a map.
     fn element(&mut self, kind: u8, depth: u32) -> io::Result<()> {
         match kind {
             1 | 2 => Err(wrong("a list of truth values")),
@@ -134,12 +155,14 @@ mod tests {
 
     #[test]
     fn fields_are_numbered_by_steps_or_in_full() {
-        // 1: 32 bits, -3; 2: true; 17: -1; 18: 300; 40, in full: 64 bits; 41: text; 42: list of two structures.
+        // 1: 32 bits, -3; 2: true; 17: -1; 18: 300; 40, in full: 64 bits; 41: text; 42: list of two structures;
+        // 43: structure of 1: true; 2: 7.
         let bytes = [
             0x15, 5, 0x11, 0xf5, 1, 0x15, 0xd8, 4, 0x06, 80, 1, 0x18, 2, b'a', b'b', 0x19, 0x2c, 0x15, 2, 0,
-            0, 0,
+            0, 0x1c, 0x11, 0x15, 14, 0, 0,
         ];
-        assert_eq!(walk(&bytes[..]).unwrap(), [(1, -3), (17, -1), (18, 300)]);
+        let own = |number, value| ((None, number), value);
+        assert_eq!(walk(&bytes[..]).unwrap(), [own(1, -3), own(17, -1), own(18, 300), ((Some(43), 2), 7)]);
         assert_eq!(walk(&bytes[..3]).unwrap_err().kind(), ErrorKind::UnexpectedEof);
     }
 

@@ -94,7 +94,9 @@ pub(super) fn compiled() -> String {
 pub(super) fn remedy() -> String {
     match wanted_backends() {
         Some(value) => format!("the variable {BACKEND} is {value:?} and hides all others, unset it"),
-        None => "install a Vulkan driver (Debian: mesa-vulkan-drivers)".to_owned(),
+        None => "install a Vulkan driver (Debian: mesa-vulkan-drivers); of one that is there, \
+                 VK_LOADER_DEBUG=error says what it lacks"
+            .to_owned(),
     }
 }
 

@@ -99,7 +99,7 @@ pub(super) fn sampler(
     let program = recipe.program().with_status();
     let forms = choice.forms();
     for (i, &arithmetic) in forms.iter().enumerate() {
-        let variant = ShaderVariant { dialect: Sampler::dialect(device), indexing, arithmetic };
+        let variant = ShaderVariant { indexing, arithmetic, ..Sampler::variant(device) };
         let shader = Sampler::shader_of(&program, variant)?;
         let key = (format!("{} {}", gpu.adapter(), gpu.adapter().int64), sum(&shader));
         let known = TRIALS.lock().expect("no holder panics").get(&key).copied();
@@ -154,10 +154,21 @@ fn trial_responses(recipe: &Recipe, count: u64) -> Vec<f32> {
 
 /// Whether the draws of a pipeline are those of the CPU.
 fn trial(gpu: &Gpu, recipe: &Recipe, sampler: &Sampler, indexing: Indexing) -> Result<bool, EngineError> {
+    let count = trial_draws(recipe, gpu.adapter().kind == "software");
+    agrees(gpu, recipe, sampler, indexing, count)
+}
+
+/// Whether this number of a pipeline's draws are those of the CPU.
+fn agrees(
+    gpu: &Gpu,
+    recipe: &Recipe,
+    sampler: &Sampler,
+    indexing: Indexing,
+    count: u64,
+) -> Result<bool, EngineError> {
     let job = Job { recipe, per_step: 1 };
     let mut schedule = GpuSchedule::of_samplers(gpu, &[job], vec![sampler.clone()])?;
     let reference = Reference::new(recipe);
-    let count = trial_draws(recipe, gpu.adapter().kind == "software");
     let stream = Stream::named(0, "trial");
     let indices: Vec<u64> = (0..count).collect();
     let draws: Draws = match indexing {
@@ -284,7 +295,12 @@ fn run_self_test(gpu: &Gpu) -> Result<Vec<u32>, EngineError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::{BuiltinTable, Dataset, SpectrumKind};
     use crate::engine::{Engine, EngineChoice};
+    use crate::grid::Extrapolation;
+    use crate::model::Fit;
+    use crate::quantity::{Dtype, Layout, Quantity};
+    use crate::wgsl::{Dialect, ShaderVariant, Stores};
 
     #[test]
     fn the_lesser_verdict_counts() {
@@ -314,13 +330,58 @@ mod tests {
         let recipe = Recipe::builder(&model).build().unwrap();
         let program = recipe.program().with_status();
         let (device, _) = gpu.device();
-        let variant = ShaderVariant { dialect: Sampler::dialect(device), ..ShaderVariant::default() };
+        let variant = ShaderVariant { arithmetic: Arithmetic::Exact, ..Sampler::variant(device) };
         let (text, tables) = crate::wgsl::shader_of(&program, variant);
         for (change, is_exact) in [("0.087404214f", true), ("0.087404215f", true), ("0.08740423f", false)] {
             let text = text.replace("0.087404214f", change);
             let shader = ComputeShader::with_text(&program, variant, text, &tables.values).unwrap();
             let sampler = Sampler::with_shader(device, shader, None).unwrap();
             assert_eq!(trial(gpu, &recipe, &sampler, Indexing::Range).unwrap(), is_exact, "{change}");
+        }
+    }
+
+    /// Rows that a workgroup gathers, as hardware has them, on whatever adapter there is: in one tile and in several, with
+    /// workgroups that are not full, beside quantities that are not gathered.
+    #[test]
+    fn gathered_rows_are_those_of_the_cpu() {
+        let engine = Engine::new(&EngineChoice::Gpu).expect("this test needs an adapter");
+        let gpu = engine.gpu().expect("it is an adapter's");
+        let (device, _) = gpu.device();
+        let own = Sampler::variant(device);
+        let dialect = if own.dialect == Dialect::Baseline { own.dialect } else { Dialect::Int64 };
+        let vrhel = |grid: &str, components| {
+            let data =
+                Dataset::new(&[BuiltinTable::Vrhel.table()], grid.parse().unwrap(), Extrapolation::Error);
+            Fit::new(SpectrumKind::Reflectance).components(components).fit(&data.unwrap()).unwrap()
+        };
+        let all = || {
+            Quantity::ALL.iter().copied().filter(|q| !matches!(q, Quantity::Intensity | Quantity::Responses))
+        };
+        let layouts = [Layout::Rows, Layout::PaddedRows, Layout::Planes];
+        for (model, bands, layouts) in [
+            (Model::builtin("munsell-vrhel").unwrap(), 31, &layouts[..]),
+            (vrhel("400:5:715", 3), 64, &layouts[..2]),
+            (vrhel("400:1:700", 6), 301, &layouts[..1]),
+        ] {
+            assert_eq!(model.grid().len(), bands);
+            let formats = layouts.iter().map(|layout| (*layout, Dtype::F32));
+            for (layout, dtype) in formats.chain([(Layout::Rows, Dtype::F16)]) {
+                let recipe = Recipe::builder(&model).quantities(all()).layout(layout).spectra_dtype(dtype);
+                let recipe = recipe.lrv(0.2..0.6).build().unwrap();
+                for indexing in [Indexing::Range, Indexing::List] {
+                    let arithmetic = Arithmetic::Exact;
+                    let variant = ShaderVariant { dialect, indexing, arithmetic, stores: Stores::Gathered };
+                    let shader = Sampler::shader_of(&recipe.program().with_status(), variant).unwrap();
+                    // Two halves are a word of two draws, which take more candidates than a dispatch tries.
+                    let gathers = layout != Layout::Planes && dtype == Dtype::F32;
+                    assert_eq!(shader.text().contains("workgroupBarrier"), gathers, "{layout:?}, {dtype:?}");
+                    let sampler = Sampler::with_shader(device, shader, None).unwrap();
+                    for count in [1, 63, 64, 1001] {
+                        let agrees = agrees(gpu, &recipe, &sampler, indexing, count).unwrap();
+                        assert!(agrees, "{bands} bands, {layout:?}, {dtype:?}, {variant:?}, {count} draws");
+                    }
+                }
+            }
         }
     }
 }

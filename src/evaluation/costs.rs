@@ -16,7 +16,7 @@ use crate::random::stream::Stream;
 use crate::recipe::{Recipe, RecipeError};
 use crate::sampler::{Prepared, Sampler};
 pub use crate::wgsl::Part;
-use crate::wgsl::{ComputeShader, ShaderVariant, shader_without};
+use crate::wgsl::{ComputeShader, shader_without};
 
 /// Draws per dispatch. Their spectra stay below the least size of a buffer that a device may offer.
 const COUNT: u64 = 1 << 19;
@@ -123,7 +123,7 @@ fn never_rejected(model: &Model) -> Result<Program, RecipeError> {
 
 /// Makes the sampler of a program without a part.
 fn sampler(device: &Device, program: &Program, part: Option<Part>) -> Result<Sampler, EngineError> {
-    let variant = ShaderVariant { dialect: Sampler::dialect(device), ..ShaderVariant::default() };
+    let variant = Sampler::variant(device);
     let (text, tables) = shader_without(program, variant, part);
     let shader = ComputeShader::with_text(program, variant, text, &tables.values);
     Ok(Sampler::with_shader(device, shader.expect("it has the bands of a model"), None)?)
@@ -135,7 +135,7 @@ mod tests {
 
     use super::*;
     use crate::engine::EngineChoice;
-    use crate::wgsl::Dialect;
+    use crate::wgsl::{Dialect, ShaderVariant};
 
     fn model() -> Model {
         Model::builtin("munsell-vrhel").unwrap()

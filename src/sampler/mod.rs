@@ -21,7 +21,7 @@ use crate::quantity::Quantity;
 use crate::random::stream::DrawRange;
 use crate::recipe::Recipe;
 use crate::wgsl::{
-    Arithmetic, Binding, BindingRole, ComputeShader, Dialect, Indexing, ShaderVariant, WgslError,
+    Arithmetic, Binding, BindingRole, ComputeShader, Dialect, Indexing, ShaderVariant, Stores, WgslError,
 };
 
 /// The most dispatches that are recorded for one range: its draws take no more candidates than these try.
@@ -91,7 +91,7 @@ impl Sampler {
         program: &Program,
         SamplerOptions { arithmetic, indexing, cache }: SamplerOptions,
     ) -> Result<Sampler, SamplerError> {
-        let variant = ShaderVariant { dialect: Sampler::dialect(device), indexing, arithmetic };
+        let variant = ShaderVariant { indexing, arithmetic, ..Sampler::variant(device) };
         Sampler::with_shader(device, Sampler::shader_of(program, variant)?, cache)
     }
 
@@ -137,7 +137,11 @@ impl Sampler {
             layout: Some(&pipeline_layout),
             module: &module,
             entry_point: Some(ComputeShader::ENTRY_POINT),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                // Whatever is read of it has been written.
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
             cache,
         });
         let storage = |label, role| {
@@ -150,14 +154,17 @@ impl Sampler {
         Ok(Sampler { pipeline, layout, shader: Arc::new(shader), tables, proposal })
     }
 
-    /// The capabilities of a device that a shader makes use of.
-    pub fn dialect(device: &Device) -> Dialect {
+    /// The variant of a shader that suits a device, for draws of a range in plain arithmetic.
+    pub fn variant(device: &Device) -> ShaderVariant {
         let int64 = device.features().contains(wgpu::Features::SHADER_INT64);
-        match (int64, device.adapter_info().device_type) {
+        let is_software = device.adapter_info().device_type == wgpu::DeviceType::Cpu;
+        let dialect = match (int64, is_software) {
             (false, _) => Dialect::Baseline,
-            (true, wgpu::DeviceType::Cpu) => Dialect::SoftwareInt64,
-            (true, _) => Dialect::Int64,
-        }
+            (true, true) => Dialect::SoftwareInt64,
+            (true, false) => Dialect::Int64,
+        };
+        let stores = if is_software { Stores::Direct } else { Stores::Gathered };
+        ShaderVariant { dialect, stores, ..ShaderVariant::default() }
     }
 
     /// Number of dispatches that a range takes whose draws may take all the candidates that they are allowed.

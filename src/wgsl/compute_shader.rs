@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{
     Arithmetic, Dialect, GIVEN_AT, INDICES_AT, Indexing, OUTPUTS_AT, PARAMETERS_AT, PROGRESS_AT, PROPOSAL_AT,
-    TABLES_AT, WORKGROUP, WgslError, attempts_per_dispatch, draws_per_thread, is_sliced, shader_of,
+    Stores, TABLES_AT, WORKGROUP, WgslError, attempts_per_dispatch, draws_per_thread, is_sliced, shader_of,
 };
 use crate::program::{Program, Proposal};
 use crate::quantity::{ArrayFormat, Quantity};
@@ -23,6 +23,8 @@ pub struct ShaderVariant {
     pub indexing: Indexing,
     /// Form of the arithmetic.
     pub arithmetic: Arithmetic,
+    /// Way of rows to the buffers.
+    pub stores: Stores,
 }
 
 /// Content of a binding of a compute shader.

@@ -121,6 +121,18 @@ pub enum Indexing {
     List,
 }
 
+/// Way of the values of a draw to the buffers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Stores {
+    /// Each thread writes its own row.
+    #[default]
+    Direct,
+    /// A workgroup gathers the rows of its threads in its own memory (16 KiB at most), and writes them in order: 2 to
+    /// 3 times as fast on hardware, which writes neighbouring words together. Values that lie in planes, and draws that run in loops,
+    /// are written by their threads all the same.
+    Gathered,
+}
+
 /// Form in which a program's arithmetic is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {
@@ -320,7 +332,8 @@ mod tests {
             for (i, (target, needs)) in targets.into_iter().enumerate() {
                 // Each form with each dialect, but not of every program: there are hundreds.
                 let (indexing, arithmetic) = VARIANTS[(number + i) % 2];
-                let variant = ShaderVariant { dialect: target, indexing, arithmetic };
+                let stores = [Stores::Direct, Stores::Gathered][(number / 2 + i) % 2];
+                let variant = ShaderVariant { dialect: target, indexing, arithmetic, stores };
                 let (text, _) = shader_of(&program, variant);
                 if let Err(e) = validate(&text, needs) {
                     panic!("{variant:?} {:?} {:?}: {e}", program.target, program.outputs[0].format);
@@ -380,7 +393,7 @@ mod tests {
         let generated = |program: &Program, target| {
             let tables = Tables::new(program);
             let text = arithmetic(program, &tables, Arithmetic::Plain, None)
-                + &store(program, &tables, target, None);
+                + &store(program, &tables, target, None, false);
             written(&text, Arithmetic::Plain, Zero::Parameter)
         };
         for (name, program, target) in [
@@ -427,9 +440,19 @@ mod tests {
         // What the exact form has in place of `lrv_base`.
         let (program, exact) = (lrv(Bounds::Base), Arithmetic::Exact);
         let tables = Tables::new(&program);
-        let text =
-            arithmetic(&program, &tables, exact, None) + &store(&program, &tables, Dialect::Baseline, None);
+        let text = arithmetic(&program, &tables, exact, None)
+            + &store(&program, &tables, Dialect::Baseline, None, false);
         insta::assert_snapshot!("exact_lrv_base", text);
+        // Rows that are gathered, in two tiles where there are many bands.
+        let variant = ShaderVariant { stores: Stores::Gathered, ..ShaderVariant::default() };
+        for (name, bands, spectra) in [("gathered", 70, Dtype::F32), ("gathered_halves", 4, Dtype::F16)] {
+            let mut program = program_of(SpectrumKind::Reflectance, bands, 1, None);
+            program.outputs[0].format.dtype = spectra;
+            let (text, _) = shader_of(&program, variant);
+            let (_, stored) = text.split_once("fn store(").expect("it stores");
+            let lines = stored.lines().filter(|line| !line.contains("let spectra_"));
+            insta::assert_snapshot!(name, lines.collect::<Vec<_>>().join("\n"));
+        }
         let large = |law, layout, spectra| {
             with_all(
                 program_of(SpectrumKind::Reflectance, 400, 6, Some((law, Bounds::Both))),

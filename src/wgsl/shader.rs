@@ -2,11 +2,11 @@
 
 use super::arithmetic::{self, arithmetic};
 use super::guards::{Zero, written};
-use super::store::store;
+use super::store::{pitch, store};
 use super::writer::list;
 use super::{
     Arithmetic, Dialect, Form, GIVEN_AT, INDICES_AT, Indexing, PROGRESS_AT, PROPOSAL_AT, Part, ShaderVariant,
-    TABLES_AT, Tables, WORKGROUP, draws_per_thread, part,
+    Stores, TABLES_AT, Tables, WORKGROUP, draws_per_thread, part,
 };
 use crate::program::{IntensityLaw, Program, Proposal};
 use crate::quantity::Dtype;
@@ -30,6 +30,7 @@ const PARAMETERS: &str = include_str!("../../shaders/parameters.wgsl");
 const WORDS: &str = include_str!("../../shaders/words.wgsl");
 const HALF: &str = include_str!("../../shaders/half.wgsl");
 const MAIN: &str = include_str!("../../shaders/main.wgsl");
+const GATHERED: &str = include_str!("../../shaders/gathered.wgsl");
 const SLICES: &str = include_str!("../../shaders/slices.wgsl");
 const GIVEN: &str = include_str!("../../shaders/given.wgsl");
 
@@ -100,7 +101,7 @@ pub(crate) fn shader_of(program: &Program, variant: ShaderVariant) -> (String, T
 /// The compute shader of a program. Where it lacks a part, what it draws is wrong, and its time shows what the part costs.
 pub(crate) fn shader_without(
     program: &Program,
-    ShaderVariant { dialect: target, indexing, arithmetic }: ShaderVariant,
+    ShaderVariant { dialect: target, indexing, arithmetic, stores }: ShaderVariant,
     part: Option<Part>,
 ) -> (String, Tables) {
     let changed = (part == Some(Part::Reconstruction)).then(|| one_gain_each(program));
@@ -150,11 +151,29 @@ pub(crate) fn shader_without(
     if target == Dialect::SoftwareInt64 && draws == 2 && elements().any(|element| element != Dtype::F16) {
         parts.push(WORDS.to_owned());
     }
-    parts.push(store(program, &tables, target, part));
-    let drawn = if draws == 2 { "draw_at(i), draw_at(i + 1u)" } else { "draw_at(i)" };
-    let done = if draws == 2 { "is_done(i) && is_done(i + 1u)" } else { "is_done(i)" };
-    let main = kept(MAIN, holds).replace("WORKGROUP", &WORKGROUP.to_string()).replace("ALL_DONE", done);
-    parts.push(main.replace("PER_THREAD", &format!("{draws}u")).replace("DRAWS", drawn));
+    // Draws that are sliced may be written already; and a thread that gathers waits for the others.
+    let may_gather = stores == Stores::Gathered && !sliced && part != Some(Part::Store);
+    let pitch = pitch(program, target).filter(|_| may_gather);
+    parts.push(store(program, &tables, target, part, pitch.is_some()));
+    let names: &[_] = if draws == 2 { &["a", "b"] } else { &["a"] };
+    let drawn = ["draw_at(i)", "draw_at(i + 1u)"];
+    let main = match pitch {
+        Some(pitch) => {
+            let declared = names.iter().map(|name| format!("var {name}: Draw;"));
+            let made = names.iter().zip(drawn).map(|(name, draw)| format!("{name} = {draw};"));
+            GATHERED
+                .replace("PITCH", &pitch.to_string())
+                .replace("DECLARED", &declared.collect::<Vec<_>>().join("\n    "))
+                .replace("DRAWN", &made.collect::<Vec<_>>().join("\n        "))
+                .replace("NAMES", &names.join(", "))
+        }
+        None => {
+            let done = if draws == 2 { "is_done(i) && is_done(i + 1u)" } else { "is_done(i)" };
+            kept(MAIN, holds).replace("ALL_DONE", done).replace("DRAWS", &drawn[..names.len()].join(", "))
+        }
+    };
+    let main = main.replace("PER_THREAD", &format!("{draws}u")).replace("WORKGROUP", &WORKGROUP.to_string());
+    parts.push(main);
     (written(&parts.join("\n"), arithmetic, Zero::Parameter), tables)
 }
 

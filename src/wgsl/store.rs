@@ -1,4 +1,6 @@
 //! Stores of a thread's draws: `fn store`, and the buffers that it writes.
+//!
+//! It writes its rows as they are made, or by way of the workgroup's memory (see `shaders/gathered.wgsl`).
 
 use super::tables::Tables;
 use super::writer::Text;
@@ -7,6 +9,10 @@ use crate::draw_status::DrawStatus;
 use crate::program::{Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
 use crate::random::real::DrawOperations;
+
+/// The most words of a row that are gathered at a time: a workgroup has 16 KiB everywhere.
+const MOST_GATHERED: usize = 63;
+const _: () = assert!(size_of::<u32>() * super::WORKGROUP as usize * pitch_of(MOST_GATHERED) <= 16 << 10);
 
 /// Packing of an output's values into words of its buffer.
 #[derive(Clone, Copy, PartialEq)]
@@ -70,12 +76,47 @@ struct Store<'a> {
     draws: &'static [&'static str],
     /// Part that is left out.
     part: Option<Part>,
+    /// Whether rows go by way of the workgroup's memory.
+    gathers: bool,
+}
+
+/// Number of words of a row that are gathered at a time.
+fn tile(words: usize) -> usize {
+    words.div_ceil(words.div_ceil(MOST_GATHERED))
+}
+
+/// Distance of gathered rows: odd, so that neighbouring threads write to different banks of memory.
+const fn pitch_of(words: usize) -> usize {
+    words | 1
+}
+
+/// Whether rows of these values are gathered, where any are.
+fn is_gathered(format: &ArrayFormat) -> bool {
+    format.width > 1 && format.layout != Layout::Planes
+}
+
+/// Largest distance of gathered rows; `None` where there are none.
+pub(super) fn pitch(program: &Program, target: Dialect) -> Option<usize> {
+    let form = Form::of(program);
+    if form == Form::Looped || target == Dialect::SoftwareInt64 {
+        return None;
+    }
+    let draws = draws_per_thread(program, target) as usize;
+    let formats = program.outputs.iter().map(|output| &output.format).filter(|format| is_gathered(format));
+    let words = formats.map(|format| draws * format.stride() / Word::of(format, form, target).values());
+    words.map(|words| pitch_of(tile(words))).max()
 }
 
 /// Writes the stores of all but a part.
-pub(super) fn store(program: &Program, tables: &Tables, target: Dialect, part: Option<Part>) -> String {
+pub(super) fn store(
+    program: &Program,
+    tables: &Tables,
+    target: Dialect,
+    part: Option<Part>,
+    gathers: bool,
+) -> String {
     let draws: &[_] = if draws_per_thread(program, target) == 2 { &["a", "b"] } else { &["a"] };
-    let store = Store { program, tables, target, form: Form::of(program), draws, part };
+    let store = Store { program, tables, target, form: Form::of(program), draws, part, gathers };
     let mut text = Text::default();
     for output in &program.outputs {
         let ArrayFormat { quantity, dtype, .. } = output.format;
@@ -87,7 +128,14 @@ pub(super) fn store(program: &Program, tables: &Tables, target: Dialect, part: O
         ));
     }
     let arguments: String = draws.iter().map(|d| format!(", {d}: Draw")).collect();
-    text.block(&format!("fn store(thread: u32{arguments})"), |body| {
+    let where_to = if gathers { "thread: u32, local: u32, is_there: bool" } else { "thread: u32" };
+    text.block(&format!("fn store({where_to}{arguments})"), |body| {
+        if gathers {
+            let (count, rest) = (draws.len(), draws.len() - 1);
+            body.line("let first = thread - local;");
+            body.line(&format!("let end = (parameters.count + {rest}u) / {count}u;"));
+            body.line("let rows = min(THREADS, max(end, first) - first);");
+        }
         for d in draws {
             body.line(&format!("let ok_{d} = {d}.attempts != 0u;"));
             if store.form == Form::Looped {
@@ -169,6 +217,12 @@ impl Store<'_> {
             true => format!("{quantity}_{d}{j}"),
             false => "0f".to_owned(), // padding
         };
+        if self.gathers && is_gathered(format) {
+            let values: Vec<_> =
+                self.draws.iter().flat_map(|d| (0..format.stride()).map(move |j| named(d, j))).collect();
+            let words = values.chunks_exact(word.values()).map(|values| word.pack(dtype, values));
+            return gather(body, quantity, word.name(dtype), &words.collect::<Vec<_>>());
+        }
         let runs: Vec<(String, Vec<String>)> = match format.layout {
             Layout::Rows | Layout::PaddedRows => {
                 let values = self.draws.iter().flat_map(|d| (0..format.stride()).map(move |j| named(d, j)));
@@ -190,10 +244,16 @@ impl Store<'_> {
             let sum = words.map(|values| word.pack(dtype, values)).collect::<Vec<_>>().join(" + ");
             return body.line(&format!("{quantity}[thread] = {sum};"));
         }
-        for (start, values) in runs {
-            for (at, values) in values.chunks_exact(word.values()).enumerate() {
-                body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(dtype, values)));
+        let stores = |body: &mut Text| {
+            for (start, values) in &runs {
+                for (at, values) in values.chunks_exact(word.values()).enumerate() {
+                    body.line(&format!("{quantity}[{start} + {at}u] = {};", word.pack(dtype, values)));
+                }
             }
+        };
+        match self.gathers {
+            true => body.block("if is_there", stores),
+            false => stores(body),
         }
     }
 
@@ -248,6 +308,29 @@ impl Store<'_> {
                 }
             }
         }
+    }
+}
+
+/// Writes the words of each thread's row by way of the workgroup's memory, tile by tile.
+fn gather(body: &mut Text, quantity: Quantity, word: &str, words: &[String]) {
+    let (all, tile) = (words.len(), tile(words.len()));
+    for (n, part) in words.chunks(tile).enumerate() {
+        let (start, count) = (n * tile, part.len());
+        let pitch = pitch_of(count);
+        body.line("workgroupBarrier();");
+        for (at, value) in part.iter().enumerate() {
+            body.line(&format!("gathered[local * {pitch}u + {at}u] = bitcast<u32>({value});"));
+        }
+        body.line("workgroupBarrier();");
+        body.block(&format!("for (var at = local; at < rows * {count}u; at += THREADS)"), |body| {
+            let (row, column) = (format!("(at / {count}u)"), format!("at % {count}u"));
+            let from = if pitch == count { "at".to_owned() } else { format!("{row} * {pitch}u + {column}") };
+            let to = match count == all {
+                true => format!("first * {all}u + at"),
+                false => format!("(first + {row}) * {all}u + {start}u + {column}"),
+            };
+            body.line(&format!("{quantity}[{to}] = bitcast<{word}>(gathered[{from}]);"));
+        });
     }
 }
 

@@ -10,7 +10,7 @@ use crate::model::Model;
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
 use crate::sampler::{Prepared, Sampler};
-use crate::wgsl::{ComputeShader, ShaderVariant, shader_of};
+use crate::wgsl::{ComputeShader, shader_of};
 
 /// Sizes of windows, MiB.
 const WINDOWS: [u64; 6] = [8, 16, 32, 64, 128, 256];
@@ -71,12 +71,16 @@ pub(super) fn windows(engine: &Engine) -> Result<Vec<WindowRate>, AdapterError> 
 pub(super) fn workgroups(engine: &Engine) -> Result<Vec<WorkgroupRate>, AdapterError> {
     let (device, _) = engine.device().expect("it is an adapter's");
     let program = surfaces()?.program().clone();
-    let variant = ShaderVariant { dialect: Sampler::dialect(device), ..ShaderVariant::default() };
+    let variant = Sampler::variant(device);
     let (text, tables) = shader_of(&program, variant);
     let ours = format!("@workgroup_size({})", ComputeShader::WORKGROUP_SIZE);
     assert_eq!(text.matches(&ours).count(), 1, "the text has one entry point");
     let of_size = |threads: u32| -> Result<WorkgroupRate, AdapterError> {
         let text = text.replace(&ours, &format!("@workgroup_size({threads})"));
+        let text = text.replace(
+            &format!("THREADS = {}u", ComputeShader::WORKGROUP_SIZE),
+            &format!("THREADS = {threads}u"),
+        );
         let shader = ComputeShader::with_text(&program, variant, text, &tables.values);
         let sampler = Sampler::with_shader(device, shader.expect("it has the bands of a model"), None)?;
         let per_group = sampler.shader().draws_per_workgroup() / u64::from(ComputeShader::WORKGROUP_SIZE);
