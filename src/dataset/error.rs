@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::MAX_BYTES;
 use super::units::WavelengthUnit;
-use crate::grid::{Grid, GridError};
+use crate::grid::{Grid, GridError, shortest};
 use crate::wording::counted;
 
 /// Setting of a reader or a fit that the message of an error advises.
@@ -98,7 +98,10 @@ pub enum DatasetError {
     #[error("{place}: {reason}")]
     Spectrum { place: String, reason: String, remedy: Remedy },
     #[error(
-        "{name} was measured from {first} to {last} nm, which does not cover the grid {grid}: choose a grid within it, or extrapolate (hold or zero)"
+        "{name} was measured from {} to {} nm, which does not cover the grid {grid}: choose a grid within it, or \
+         extrapolate (hold or zero)",
+        shortest(*first),
+        shortest(*last)
     )]
     Range { name: String, first: f64, last: f64, grid: Grid },
 }

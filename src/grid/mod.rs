@@ -177,7 +177,7 @@ pub(crate) fn trapezoid(x: &[f64]) -> Vec<f64> {
 }
 
 /// The shortest decimal that single precision rounds to this value.
-fn shortest(value: f64) -> f64 {
+pub(crate) fn shortest(value: f64) -> f64 {
     (value as f32).to_string().parse().expect("a number is read as it was written")
 }
 

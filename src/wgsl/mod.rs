@@ -127,9 +127,9 @@ pub enum Stores {
     /// Each thread writes its own row.
     #[default]
     Direct,
-    /// A workgroup gathers the rows of its threads in its own memory (16 KiB at most), and writes them in order: 2 to
-    /// 3 times as fast on hardware, which writes neighbouring words together. Values that lie in planes, and draws that run in loops,
-    /// are written by their threads all the same.
+    /// A workgroup gathers the rows of its threads in its own memory (16 KiB at most), and writes them in order: 2 to 3 times
+    /// as fast on hardware, which writes neighbouring words together. Values that lie in planes, and draws that run in loops
+    /// or in several dispatches, are written by their threads all the same.
     Gathered,
 }
 
