@@ -14,8 +14,8 @@ use machine::{Liberties, Machine};
 use rayon::prelude::*;
 use spectroll::{
     Arithmetic, Batch, BindingRole, Bounds, BuiltinTable, ComputeShader, Dataset, Dtype, Engine,
-    EngineChoice, EngineError, Extrapolation, Fit, Intensity, Layout, Model, ProposalKind, Quantity, Recipe,
-    RecipeBuilder, Sensors, ShaderVariant, SpectrumKind, Stream,
+    EngineChoice, EngineError, Extrapolation, Fit, FitDistribution, Intensity, Layout, Model, ProposalKind,
+    Quantity, Recipe, RecipeBuilder, Sensors, ShaderVariant, SpectrumKind, Stream,
 };
 use tape::Tape;
 
@@ -26,21 +26,35 @@ fn exact() -> ShaderVariant {
     ShaderVariant { arithmetic: Arithmetic::Exact, ..ShaderVariant::default() }
 }
 
+fn builtin(name: &str) -> Model {
+    Model::builtin(name).expect("it is built in")
+}
+
 fn surfaces() -> RecipeBuilder {
-    Recipe::builder(&Model::builtin("munsell-vrhel").expect("it is built in"))
+    Recipe::builder(&builtin("munsell-vrhel"))
 }
 
 fn lights() -> RecipeBuilder {
-    Recipe::builder(&Model::builtin("granada").expect("it is built in"))
+    Recipe::builder(&builtin("granada"))
 }
 
-/// Surfaces of 361 bands, which run in loops.
-fn fine_surfaces() -> RecipeBuilder {
-    let grid = "390:1:730".parse().expect("a grid");
+/// Surfaces about three centres.
+fn mixture() -> RecipeBuilder {
+    Recipe::builder(&fit("400:10:700", 6, FitDistribution::Mixture(3)))
+}
+
+/// A model of Vrhel's reflectances.
+fn fit(grid: &str, components: usize, distribution: FitDistribution) -> Model {
+    let grid = grid.parse().expect("a grid");
     let data =
         Dataset::new(&[BuiltinTable::Vrhel.table()], grid, Extrapolation::Error).expect("they cover it");
-    let model = Fit::new(SpectrumKind::Reflectance).components(7).fit(&data).expect("they have that rank");
-    Recipe::builder(&model)
+    let fit = Fit::new(SpectrumKind::Reflectance).components(components).distribution(distribution);
+    fit.fit(&data).expect("they have that rank")
+}
+
+/// Surfaces of 341 bands, which run in loops.
+fn fine_surfaces() -> RecipeBuilder {
+    Recipe::builder(&fit("390:1:730", 7, FitDistribution::Gaussian))
 }
 
 /// Recipes of every kind of text, all with every quantity that they can have.
@@ -60,6 +74,8 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
         ("lrv each", of(surfaces().lrv(0.2..0.6).bounds(Bounds::Both).layout(Layout::PaddedRows))),
         ("halves", of(surfaces().lrv(0.6).bounds(Bounds::Both).spectra_dtype(Dtype::F16))),
         ("cover", of(surfaces().lrv(0.99).bounds(Bounds::Scaled))),
+        ("kernel", of(Recipe::builder(&builtin("munsell-vrhel-kernel")))),
+        ("mixture", of(mixture())),
         ("log-uniform", lit(lights().intensity(intensity))),
         ("of the data", lit(lights().intensity(Intensity::Data))),
         ("given", of(surfaces().given(Sensors::builtin("cie1931").expect("it is built in")))),
@@ -204,8 +220,7 @@ fn the_exact_form_has_the_bytes_of_the_cpu_whatever_a_device_does() {
 fn a_million_draws_of_each_kind_have_the_bytes_of_the_cpu() {
     for (number, (mode, liberties)) in MODES.into_iter().enumerate() {
         for (name, recipe) in recipes() {
-            let count = if name.starts_with("looped") { 50_000 } else { 1_000_000 };
-            let count = if number == 0 { count } else { count / 10 };
+            let count = if number == 0 { 1_000_000 } else { 100_000 };
             let start = std::time::Instant::now();
             let off = of_form(&recipe, Arithmetic::Exact, liberties, count);
             let seconds = start.elapsed().as_secs_f64();
