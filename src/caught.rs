@@ -28,7 +28,7 @@ pub fn silence() {
     }));
 }
 
-#[cfg(test)]
+#[cfg(all(test, any(feature = "hdf5", feature = "parquet", feature = "spreadsheets")))]
 mod tests {
     use super::*;
 

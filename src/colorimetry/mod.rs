@@ -110,6 +110,13 @@ mod tests {
         }
     }
 
+    /// IEC 61966-2-1: 12.92 times what is dark, and mid-grey.
+    #[test]
+    fn encoded_colours_are_those_of_the_standard() {
+        assert_eq!(encode_srgb([0.003, 0.5, 0.2]), [10, 188, 124]);
+        assert_eq!(encode_srgb([-0.1, 1.5, 0.0031308]), [0, 255, 10]);
+    }
+
     /// CIE 15:2004, tables T.1 and T.4.
     #[test]
     fn observer_and_illuminants_have_their_published_numbers() {

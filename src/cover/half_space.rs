@@ -47,3 +47,16 @@ impl HalfSpace {
         !self.is_constant() && self.room < corner + 1.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In 4 dimensions the corners of the region within reach are 26 standard deviations away.
+    #[test]
+    fn what_lies_beyond_the_corners_cuts_nothing() {
+        let cuts = |room: f64| HalfSpace::new(0, vec![1.0; 4], 2.0 * room).cuts();
+        assert_eq!([-5.0, 0.0, 25.9, 26.9, 27.1].map(cuts), [true, true, true, true, false]);
+        assert!(!HalfSpace::new(0, vec![0.0; 4], -1.0).cuts());
+    }
+}

@@ -262,3 +262,30 @@ impl DistributionRecord {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of matrices of every rank, by its product.
+    #[test]
+    fn factors_are_those_of_their_covariances() {
+        let k = 5;
+        for rank in 0..=k {
+            let gain = DMatrix::from_fn(k, rank, |i, j| ((3 * i + 7 * j * j + 1) as f64).sin());
+            let covariance = &gain * gain.transpose();
+            let rows = lower_factor(&covariance);
+            let factor = DMatrix::from_fn(k, k, |i, j| if j <= i { rows[triangle(i) + j] } else { 0.0 });
+            let error = (&factor * factor.transpose() - &covariance).amax();
+            assert!(error < 1e-14, "rank {rank}: {error:e}");
+            assert_eq!((0..k).filter(|&j| factor[(j, j)] > 0.0).count(), rank);
+        }
+    }
+
+    #[test]
+    fn kinds_have_names() {
+        let kernel = Distribution::Kernel { bandwidth: 0.5, weights: DMatrix::zeros(1, 1) };
+        let names = [Distribution::Gaussian, kernel, Distribution::Mixture(Vec::new())].map(|d| d.name());
+        assert_eq!(names, ["gaussian", "kernel", "mixture"]);
+    }
+}

@@ -345,23 +345,29 @@ mod tests {
     /// A direction counts if its singular value is above max(bands, spectra) x epsilon x the largest, as in NumPy.
     #[test]
     fn a_direction_counts_from_the_tolerance_on() {
-        let rank = |size: f64| {
+        let rank = |size: f64, unit: f64| {
             let spectra: Vec<_> = (0..8u32)
                 .map(|i| {
                     // Centred, 0.25 and `size` with either sign.
                     let sign = |bit: u32| if i >> bit & 1 == 0 { 2.0 } else { 0.0 };
                     vec![0.25 * sign(0), 0.25 * sign(0), size * sign(1), 0.5, 0.5]
+                        .iter()
+                        .map(|v| v * unit)
+                        .collect()
                 })
                 .collect();
             let grid = Grid::new(400.0, 10.0, 5).unwrap();
             let table = Table::new("signs", grid.wavelengths().collect(), &spectra).unwrap();
             let data = Dataset::new(&[table], grid, Extrapolation::Error).unwrap();
-            Fit::new(SpectrumKind::Reflectance).components(2).fit(&data).map(|model| model.components())
+            let fit = Fit::new(SpectrumKind::Illuminant).components(2).normalization(Normalization::None);
+            fit.fit(&data).map(|model| model.components())
         };
         // Singular values are sqrt(8) x the sizes of the directions, of which the first has sqrt(2) / 4.
         let tolerance = 8.0 * f64::EPSILON * 2f64.sqrt() / 4.0;
-        assert_eq!(rank(1.5 * tolerance), Ok(2));
-        assert_eq!(rank(0.5 * tolerance), Err(FitError::Rank { components: 2, rank: 1 }));
+        for unit in [1.0, 2f64.powi(-40), 2f64.powi(40)] {
+            assert_eq!(rank(1.5 * tolerance, unit), Ok(2));
+            assert_eq!(rank(0.5 * tolerance, unit), Err(FitError::Rank { components: 2, rank: 1 }));
+        }
     }
 
     #[test]

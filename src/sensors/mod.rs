@@ -336,6 +336,12 @@ mod tests {
     }
 
     #[test]
+    fn channels_without_names_are_numbered() {
+        let table = Table::new("t", vec![400.0, 500.0], &[vec![0.0, 1.0], vec![1.0, 0.0]]).unwrap();
+        assert_eq!(Sensors::from_table("s", &table).unwrap().channels(), ["1", "2"]);
+    }
+
+    #[test]
     fn functions_that_cannot_be_sensors_are_refused() {
         let grid = |text: &str| text.parse::<Grid>().unwrap();
         let make = |channels: &[&str], wavelengths: &[f64], functions: &[Vec<f64>]| {
@@ -358,6 +364,12 @@ mod tests {
             "{error}"
         );
         assert!(camera().on_grid(&grid("380:10:700")).is_ok());
+        let flat = Sensors::new("s", ["a"], &[400.0, 500.0], &[vec![1.0; 2]]).unwrap();
+        assert!(flat.on_grid(&grid("410:10:490")).is_ok());
+        for (text, end) in [("390:10:490", "at 400 nm"), ("410:10:510", "at 500 nm")] {
+            let error = refused(&flat, text);
+            assert!(error.contains("100 % of its peak") && error.contains(end), "{error}");
+        }
         let error = refused(&Sensors::builtin("melanopsin").unwrap(), "900:10:1000");
         assert!(error.contains("sees nothing on the grid 900:10:1000"), "{error}");
         let opponent = Sensors::new("s", ["rg"], &[400.0, 500.0], &[vec![1.0, -1.0]]).unwrap();

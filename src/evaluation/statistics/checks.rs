@@ -421,6 +421,9 @@ mod tests {
             |p: f64| Finding { p_values: vec![0.5, p], worst: "the second".to_owned(), fault: None }.alarm();
         let limit = FALSE_ALARMS / RUNS as f64 / 2.0;
         assert_eq!((alarm(1.01 * limit), alarm(0.99 * limit)), (None, Some("the second".to_owned())));
+        let mut finding = Finding::default();
+        [0.5, 0.1, 0.3].into_iter().for_each(|p| finding.compare(p, || p.to_string()));
+        assert_eq!((finding.worst.as_str(), finding.p_values), ("0.1", vec![0.5, 0.1, 0.3]));
     }
 
     /// Three draws, by hand.

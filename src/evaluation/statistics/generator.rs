@@ -112,6 +112,7 @@ mod tests {
         let groups = uniformity(1, 6, 1 << 14);
         let all: Vec<f64> = groups.iter().flat_map(|group| group.p_values.clone()).collect();
         assert!(of_all(&all) > 1e-4 && all.iter().all(|&p| p > 1e-6), "{groups:#?}");
+        assert!(of_all(&all.iter().map(|p| p * p).collect::<Vec<_>>()) < 1e-6);
         let uniform: Vec<_> = (0..1 << 14).map(|i| i % CELLS).collect();
         assert!(chi_squared(uniform.iter().map(|&c| c / 2 * 2), CELLS) < 1e-9);
         assert!(uncorrelated(&[1.0, 2.0, 3.0, 4.0].repeat(20), &[1.0, 2.0, 3.0, 5.0].repeat(20)) < 1e-9);
