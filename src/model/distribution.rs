@@ -277,7 +277,8 @@ mod tests {
             let rows = lower_factor(&covariance);
             let factor = DMatrix::from_fn(k, k, |i, j| if j <= i { rows[triangle(i) + j] } else { 0.0 });
             let error = (&factor * factor.transpose() - &covariance).amax();
-            assert!(error < 1e-14, "rank {rank}: {error:e}");
+            // What is left out of a column of zeros is that small.
+            assert!(error < 1e-12 * covariance.amax().max(1.0), "rank {rank}: {error:e}");
             assert_eq!((0..k).filter(|&j| factor[(j, j)] > 0.0).count(), rank);
         }
     }
