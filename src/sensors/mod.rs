@@ -375,6 +375,10 @@ mod tests {
         let opponent = Sensors::new("s", ["rg"], &[400.0, 500.0], &[vec![1.0, -1.0]]).unwrap();
         let weights = opponent.reflected_weights(&[1.0; 2], &grid("400:100:500"), ResponseScale::White);
         assert!(weights.unwrap_err().to_string().contains("a perfect white has a response of"));
+        // A response of 1 is little where its parts are a thousand million.
+        let loud = Sensors::new("s", ["rg"], &[400.0, 500.0], &[vec![1e9, 1.0 - 1e9]]).unwrap();
+        let weights = loud.reflected_weights(&[1.0; 2], &grid("400:100:500"), ResponseScale::White);
+        assert!(weights.is_err());
         assert!(camera().channel("G").unwrap_err().to_string().contains("has no channel \"G\"; there are R"));
     }
 }
