@@ -360,18 +360,23 @@ mod tests {
             .filter(|q| !matches!(q, Quantity::Intensity | Quantity::Responses))
             .collect();
         let few = vec![Quantity::Spectra, Quantity::Xyz, Quantity::Attempts];
-        let layouts = [Layout::Rows, Layout::PaddedRows, Layout::Planes];
-        for (model, bands, layouts, quantities) in [
-            (Model::builtin("munsell-vrhel").unwrap(), 31, &layouts[..], &all),
-            (vrhel("400:5:715", 3), 64, &layouts[..2], &few),
-            (vrhel("400:1:700", 3), 301, &layouts[..1], &few),
+        let lists = [Indexing::Range, Indexing::List];
+        let formats = [
+            (Layout::Rows, Dtype::F32, &lists[..]),
+            (Layout::PaddedRows, Dtype::F32, &lists[..1]),
+            (Layout::Planes, Dtype::F32, &lists[..1]),
+            (Layout::Rows, Dtype::F16, &lists[..1]),
+        ];
+        for (model, bands, formats, quantities) in [
+            (Model::builtin("munsell-vrhel").unwrap(), 31, &formats[..], &all),
+            (vrhel("400:5:715", 3), 64, &formats[1..2], &few),
+            (vrhel("400:2:660", 2), 131, &formats[..1], &few),
         ] {
             assert_eq!(model.grid().len(), bands);
-            let formats = layouts.iter().map(|layout| (*layout, Dtype::F32));
-            for (layout, dtype) in formats.chain([(Layout::Rows, Dtype::F16)]) {
+            for &(layout, dtype, indexings) in formats {
                 let recipe = Recipe::builder(&model).quantities(quantities.iter().copied()).layout(layout);
                 let recipe = recipe.spectra_dtype(dtype).lrv(0.6).build().unwrap();
-                for indexing in [Indexing::Range, Indexing::List] {
+                for &indexing in indexings {
                     let arithmetic = Arithmetic::Exact;
                     let variant = ShaderVariant { dialect, indexing, arithmetic, stores: Stores::Gathered };
                     let shader = Sampler::shader_of(&recipe.program().with_status(), variant).unwrap();
