@@ -350,10 +350,7 @@ mod tests {
                 .map(|i| {
                     // Centred, 0.25 and `size` with either sign.
                     let sign = |bit: u32| if i >> bit & 1 == 0 { 2.0 } else { 0.0 };
-                    vec![0.25 * sign(0), 0.25 * sign(0), size * sign(1), 0.5, 0.5]
-                        .iter()
-                        .map(|v| v * unit)
-                        .collect()
+                    [0.25 * sign(0), 0.25 * sign(0), size * sign(1), 0.5, 0.5].map(|v| v * unit).to_vec()
                 })
                 .collect();
             let grid = Grid::new(400.0, 10.0, 5).unwrap();

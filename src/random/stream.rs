@@ -278,6 +278,8 @@ impl TryRng for StreamRng {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::RangeInclusive;
+
     use super::*;
     use crate::random::philox::philox;
     use rand::Rng;
@@ -317,7 +319,10 @@ mod tests {
         assert_eq!(parts(stream.draws(..5)), (0, 5));
         assert_eq!(parts(stream.draws(u64::MAX - 2..=u64::MAX)), (u64::MAX - 2, 3));
         assert_eq!(parts(stream.draws(5..5)), (5, 0));
-        assert_eq!([parts(stream.draws(5..=5)), parts(stream.draws(5..=4))], [(5, 1), (5, 0)]);
+        assert_eq!(
+            [parts(stream.draws(5..=5)), parts(stream.draws(RangeInclusive::new(5, 4)))],
+            [(5, 1), (5, 0)]
+        );
         assert_eq!([stream.seed(), Stream::named(7, "wall").seed()], [1, 7]);
         assert_eq!(parts(stream.draws(3..10).part(2, 4)), (5, 4));
     }
