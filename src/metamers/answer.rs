@@ -146,3 +146,36 @@ pub enum MetamerError {
     )]
     Unreachable { index: u64, colour: Vec<f32> },
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn answers_are_counted_by_their_kinds() {
+        let mut counts = AnswerCounts::default();
+        counts.add(&[Answer::Sampled { attempts: 3 }, Answer::Mode, Answer::Nearest { distance: 0.5 }]);
+        counts.add(&[Answer::Sampled { attempts: 4 }, Answer::Skipped, Answer::Unreachable]);
+        let once = AnswerCounts {
+            sampled: 2,
+            attempts: 7,
+            mode: 1,
+            nearest: 1,
+            farthest: 0.5,
+            skipped: 1,
+            unreachable: 1,
+        };
+        assert_eq!((counts, counts.all()), (once, 6));
+        counts += AnswerCounts { farthest: 0.25, ..once };
+        let twice = AnswerCounts {
+            sampled: 4,
+            attempts: 14,
+            mode: 2,
+            nearest: 2,
+            farthest: 0.5,
+            skipped: 2,
+            unreachable: 2,
+        };
+        assert_eq!((counts, counts.all()), (twice, 12));
+    }
+}
