@@ -54,6 +54,10 @@ def in_blocks(draw, set_seed, block):
     return fill
 
 
+def on_host(shape):
+    return np.empty(shape, np.float32)
+
+
 def with_numpy(model):
     generator = None
 
@@ -66,7 +70,7 @@ def with_numpy(model):
         return spectra, np.flatnonzero(((spectra > 0) & (spectra < model.limit)).all(axis=1))
 
     set_seed(0)
-    return in_blocks(draw, set_seed, BLOCK), lambda shape: np.empty(shape, np.float32)
+    return in_blocks(draw, set_seed, BLOCK), on_host
 
 
 def with_torch(model):
@@ -126,7 +130,7 @@ def with_numba(model):
     def fill(out, seed):
         return int(fill_in_parallel(out, -1 if seed is None else seed, model.mean, model.gain, limit))
 
-    return fill, lambda shape: np.empty(shape, np.float32)
+    return fill, on_host
 
 
 def say(text):
@@ -139,13 +143,13 @@ def serve(model, fill, peer):
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     start = time.perf_counter()
     bands = len(model.mean)
-    fill(np.empty((1, bands), np.float32), 1)
+    fill(on_host((1, bands)), 1)
     first = time.perf_counter() - start
     module = sys.modules[peer]
     python = ".".join(map(str, sys.version_info[:3]))
     threads = 1 if peer == "numpy" else module.get_num_threads()
     say(json.dumps({"version": module.__version__, "python": python, "threads": threads, "first_draw": first}))
-    buffer = np.empty((BLOCK, bands), np.float32)
+    buffer = on_host((BLOCK, bands))
     for line in sys.stdin:
         count, seed = map(int, line.split())
         done, seconds, candidates = 0, 0.0, 0

@@ -163,6 +163,11 @@ pub(crate) fn draws_per_thread(program: &Program, target: Dialect) -> u32 {
     }
 }
 
+/// Names of a thread's draws in the text.
+fn draw_names(program: &Program, target: Dialect) -> &'static [&'static str] {
+    if draws_per_thread(program, target) == 2 { &["a", "b"] } else { &["a"] }
+}
+
 #[cfg(test)]
 mod tests {
     use naga::valid::{Capabilities, ValidationFlags, Validator};

@@ -6,7 +6,7 @@ use super::store::{pitch, store};
 use super::writer::list;
 use super::{
     Arithmetic, Dialect, Form, GIVEN_AT, INDICES_AT, Indexing, PROGRESS_AT, PROPOSAL_AT, Part, ShaderVariant,
-    Stores, TABLES_AT, Tables, WORKGROUP, draws_per_thread, part,
+    Stores, TABLES_AT, Tables, WORKGROUP, draw_names, draws_per_thread, part,
 };
 use crate::program::{IntensityLaw, Program, Proposal};
 use crate::quantity::Dtype;
@@ -155,7 +155,7 @@ pub(crate) fn shader_without(
     let may_gather = stores == Stores::Gathered && !sliced && part != Some(Part::Store);
     let pitch = pitch(program, target).filter(|_| may_gather);
     parts.push(store(program, &tables, target, part, pitch.is_some()));
-    let names: &[_] = if draws == 2 { &["a", "b"] } else { &["a"] };
+    let names = draw_names(program, target);
     let drawn = ["draw_at(i)", "draw_at(i + 1u)"];
     let main = match pitch {
         Some(pitch) => {

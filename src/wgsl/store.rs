@@ -4,7 +4,7 @@
 
 use super::tables::Tables;
 use super::writer::Text;
-use super::{Dialect, Form, OUTPUTS_AT, Part, draws_per_thread};
+use super::{Dialect, Form, OUTPUTS_AT, Part, draw_names};
 use crate::draw_status::DrawStatus;
 use crate::program::{Output, Program, Source, Unit};
 use crate::quantity::{ArrayFormat, Dtype, Layout, Quantity, ValueRange};
@@ -101,7 +101,7 @@ pub(super) fn pitch(program: &Program, target: Dialect) -> Option<usize> {
     if form == Form::Looped || target == Dialect::SoftwareInt64 {
         return None;
     }
-    let draws = draws_per_thread(program, target) as usize;
+    let draws = draw_names(program, target).len();
     let formats = program.outputs.iter().map(|output| &output.format).filter(|format| is_gathered(format));
     let words = formats.map(|format| draws * format.stride() / Word::of(format, form, target).values());
     words.map(|words| pitch_of(tile(words))).max()
@@ -115,7 +115,7 @@ pub(super) fn store(
     part: Option<Part>,
     gathers: bool,
 ) -> String {
-    let draws: &[_] = if draws_per_thread(program, target) == 2 { &["a", "b"] } else { &["a"] };
+    let draws = draw_names(program, target);
     let store = Store { program, tables, target, form: Form::of(program), draws, part, gathers };
     let mut text = Text::default();
     for output in &program.outputs {
@@ -217,12 +217,6 @@ impl Store<'_> {
             true => format!("{quantity}_{d}{j}"),
             false => "0f".to_owned(), // padding
         };
-        if self.gathers && is_gathered(format) {
-            let values: Vec<_> =
-                self.draws.iter().flat_map(|d| (0..format.stride()).map(move |j| named(d, j))).collect();
-            let words = values.chunks_exact(word.values()).map(|values| word.pack(dtype, values));
-            return gather(body, quantity, word.name(dtype), &words.collect::<Vec<_>>());
-        }
         let runs: Vec<(String, Vec<String>)> = match format.layout {
             Layout::Rows | Layout::PaddedRows => {
                 let values = self.draws.iter().flat_map(|d| (0..format.stride()).map(move |j| named(d, j)));
@@ -243,6 +237,11 @@ impl Store<'_> {
             let words = runs.iter().flat_map(|(_, values)| values.chunks_exact(word.values()));
             let sum = words.map(|values| word.pack(dtype, values)).collect::<Vec<_>>().join(" + ");
             return body.line(&format!("{quantity}[thread] = {sum};"));
+        }
+        if self.gathers && is_gathered(format) {
+            let words = runs.iter().flat_map(|(_, row)| row.chunks_exact(word.values()));
+            let words: Vec<_> = words.map(|values| word.pack(dtype, values)).collect();
+            return gather(body, quantity, word.name(dtype), &words);
         }
         let stores = |body: &mut Text| {
             for (start, values) in &runs {
