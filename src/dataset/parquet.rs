@@ -93,11 +93,11 @@ impl<S: ChunkReader> Ending<S> {
         let mut foot = [0; FOOT as usize];
         let length = source.len();
         let ending = Ending(source);
-        let start = length.checked_sub(FOOT).ok_or(cut_short())?;
+        let start = length.checked_sub(FOOT).ok_or_else(cut_short)?;
         ending.0.get_read(start)?.read_exact(&mut foot)?;
         let (size, _) = foot.split_first_chunk().expect("it has 8 bytes");
         let size = u64::from(u32::from_le_bytes(*size));
-        let start = start.checked_sub(size).ok_or(cut_short())?;
+        let start = start.checked_sub(size).ok_or_else(cut_short)?;
         thrift::walk(Ending(ending.0.get_read(start)?).take(size))?;
         Ok(ending)
     }
@@ -175,7 +175,7 @@ impl Columns {
             let mut column = Column { name, values: Vec::new(), width: None, texts: Vec::new() };
             for group in 0..metadata.num_row_groups() {
                 let part = metadata.row_group(group).column(index);
-                unpacked(part.compression())?;
+                check_packing(part.compression())?;
                 if part.uncompressed_size() as u64 > MAX_BYTES {
                     return Err("it holds more than 512 MiB (unpacked): split it".to_owned());
                 }
@@ -371,7 +371,7 @@ fn check_page(header: &[(Field, i64)]) -> Result<(), ParquetError> {
 }
 
 /// Refuses a packing that is not read here.
-fn unpacked(packing: Compression) -> Result<(), String> {
+fn check_packing(packing: Compression) -> Result<(), String> {
     let (name, may) = match packing {
         Compression::UNCOMPRESSED | Compression::SNAPPY => return Ok(()),
         Compression::ZSTD(_) => ("zstd", cfg!(feature = "zstd")),
@@ -390,8 +390,11 @@ fn cut_short() -> ParquetError {
     ParquetError::External(Box::new(io::Error::from(io::ErrorKind::UnexpectedEof)))
 }
 
-/// The reason of a refusal of bytes that do not make a file of Parquet.
+/// The reason of a refusal of bytes that do not make a file of Parquet, or of one that the parser has no code for.
 fn damaged(error: ParquetError) -> String {
+    if let ParquetError::NYI(reason) = error {
+        return format!("it holds what is not read here ({reason}): write it in another way");
+    }
     let reason = error.to_string();
     let (_, reason) = reason.split_once(": ").unwrap_or(("", &reason));
     format!("it is damaged ({reason}); copy it again")
