@@ -6,13 +6,13 @@ use std::process::Command;
 
 use program::PROGRAM;
 
-/// Exit code and standard error of a run with a variable.
+/// Exit code of a run with a variable, and what it says.
 fn with(variable: &str, value: &str, arguments: &str) -> (Option<i32>, String) {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(PROGRAM);
     command.env_remove("WGPU_ADAPTER_NAME").env_remove("WGPU_BACKEND").env(variable, value);
     let output = command.args(arguments.split_whitespace()).current_dir(folder.path()).output().unwrap();
-    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    (output.status.code(), String::from_utf8([output.stdout, output.stderr].concat()).unwrap())
 }
 
 const ON_GPU: &str = "sample granada -n 1 --engine gpu -o y.npy";
@@ -29,6 +29,9 @@ fn a_backend_that_hides_all_adapters_is_named() {
         let (code, said) = with("WGPU_BACKEND", backend, "sample granada -n 1 --adapter 0 -o y.npy");
         assert_eq!(code, Some(3), "{said}");
         assert!(said.contains("WGPU_BACKEND"), "{said}");
+        let (code, said) = with("WGPU_BACKEND", backend, "adapters");
+        assert_eq!(code, Some(0), "{said}");
+        assert!(said.contains("the variable WGPU_BACKEND is") && !said.contains("install"), "{said}");
         let (code, said) = with("WGPU_BACKEND", backend, "sample granada -n 1 -o y.npy");
         assert_eq!(code, Some(0), "{said}");
         assert!(said.contains(&format!("with WGPU_BACKEND={backend}")), "{said}");

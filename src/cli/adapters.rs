@@ -48,8 +48,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     if adapters.is_empty() {
-        writeln!(out, "no graphics adapter; a Vulkan driver gives one (Debian: mesa-vulkan-drivers)")?;
-        writeln!(out, "of a driver that is there, VK_LOADER_DEBUG=error says what it lacks")?;
+        writeln!(out, "{}", EngineError::NoAdapters)?;
     }
     writeln!(out, "-: CPU, with --engine cpu")?;
     Ok(())

@@ -94,8 +94,8 @@ pub(super) fn compiled() -> String {
 pub(super) fn remedy() -> String {
     match wanted_backends() {
         Some(value) => format!("the variable {BACKEND} is {value:?} and hides all others, unset it"),
-        None => "install a Vulkan driver (Debian: mesa-vulkan-drivers); of one that is there, \
-                 VK_LOADER_DEBUG=error says what it lacks"
+        None => "install a Vulkan driver (Debian: mesa-vulkan-drivers; VK_LOADER_DEBUG=error says why one that is \
+                 there is not found)"
             .to_owned(),
     }
 }
