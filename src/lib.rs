@@ -97,8 +97,8 @@ pub use random::philox::philox;
 pub use random::real::Real;
 pub use random::stream::{DrawRange, Draws, Stream, StreamRng};
 pub use recipe::{
-    CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Intensity, Lrv, ProposalKind, Recipe, RecipeBuilder, RecipeError,
-    RecipeSettings, ResponseTarget, ScalarSampler, XyzScale,
+    CoverSize, DEFAULT_MAX_ATTEMPTS, Draw, Intensity, Lrv, PointlessSetting, ProposalKind, Recipe,
+    RecipeBuilder, RecipeError, RecipeSettings, ResponseTarget, ScalarSampler, XyzScale,
 };
 pub use sampler::{PrepareOptions, Prepared, Sampler, SamplerError, SamplerOptions};
 pub use sensors::{MAX_SENSORS, ResponseScale, SensorError, Sensors};

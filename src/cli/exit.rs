@@ -6,8 +6,8 @@ use spectroll::export::{ExportError, SelectionError};
 use spectroll::output::OutputError;
 use spectroll::scene::SceneError;
 use spectroll::{
-    DatasetError, EngineError, FitError, MetamerError, ModelError, Quantity, RecipeError, Remedy,
-    SensorError, Unphysical, WgslError,
+    DatasetError, EngineError, FitError, MetamerError, ModelError, PointlessSetting, Quantity, RecipeError,
+    Remedy, SensorError, Unphysical, WgslError,
 };
 
 use super::interrupt::{self, Interrupted};
@@ -206,25 +206,17 @@ fn of_value(error: &io::Error) -> &'static str {
 
 fn of_recipe(error: &RecipeError) -> &'static str {
     match error {
-        RecipeError::Pointless { setting: "an illuminant for reflectances", .. } => {
-            ": --illuminant needs --quantities xyz, linear_srgb, lrv or responses"
-        }
-        RecipeError::Pointless { setting: "an observer", .. } => {
-            ": --observer needs --lrv, or --quantities xyz, linear_srgb or lrv"
-        }
-        RecipeError::Pointless { setting: "a set of sensors", .. } => {
-            ": --sensors needs --quantities responses"
-        }
-        RecipeError::Pointless { setting: "a scale of responses", .. } => {
-            ": --response-scale needs --quantities responses"
-        }
-        RecipeError::Pointless { setting: "a scale of responses relative to white", .. } => {
-            " (--response-scale absolute)"
-        }
-        RecipeError::Pointless { setting: "a scale of tristimulus values", .. } => {
-            ": --xyz-scale needs --quantities xyz or linear_srgb"
-        }
-        RecipeError::Pointless { .. } => ": --bounds needs --lrv",
+        RecipeError::Pointless(setting) => match setting {
+            PointlessSetting::Bounds => ": --bounds needs --lrv",
+            PointlessSetting::Illuminant => {
+                ": --illuminant needs --quantities xyz, linear_srgb, lrv or responses"
+            }
+            PointlessSetting::Observer => ": --observer needs --lrv, or --quantities xyz, linear_srgb or lrv",
+            PointlessSetting::Sensors => ": --sensors needs --quantities responses",
+            PointlessSetting::ResponseScale => ": --response-scale needs --quantities responses",
+            PointlessSetting::WhiteResponseScale => " (--response-scale absolute)",
+            PointlessSetting::XyzScale => ": --xyz-scale needs --quantities xyz or linear_srgb",
+        },
         RecipeError::Quantity { quantity: Quantity::Intensity, .. } => {
             ": --quantities intensity needs --intensity"
         }

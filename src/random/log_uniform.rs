@@ -10,6 +10,11 @@ pub(crate) fn uniform(word: u32) -> f32 {
     (word as f32 + 0.5) * 2.3283064e-10
 }
 
+/// [`uniform`] in f64, which has its 33 bits exactly, so that the logarithm of one near 1 keeps its digits.
+pub(crate) fn exact_uniform(word: u32) -> f64 {
+    (f64::from(word) + 0.5) * 2f64.powi(-32)
+}
+
 /// 2^t for t in [0, 126]; the relative error of the polynomial is 1.4e-8.
 #[inline(always)]
 pub(crate) fn exp2(t: f32) -> f32 {

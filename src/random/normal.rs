@@ -12,7 +12,9 @@
 //! cosine by 1.3e-7.
 
 use std::f32::consts::LN_2;
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::TAU;
+
+use crate::random::log_uniform::exact_uniform;
 
 /// log(1 + t) for t in [sqrt(1/2) - 1, sqrt(2) - 1]. The coefficients are a minimax fit in f64, rounded one by one
 /// with the rest fitted again; relative error of the polynomial 3e-8.
@@ -68,13 +70,11 @@ pub(crate) fn circle(y: u32) -> [f32; 2] {
 }
 
 pub(crate) fn exact_radius(x: u32) -> f64 {
-    let w = |x: u32| (f64::from(x) + 0.5) / 2f64.powi(32);
-    let log = if x < 0x8000_0000 { w(x).ln() } else { (-w(!x)).ln_1p() };
-    (-log).sqrt() * SQRT_2
+    (-2.0 * exact_uniform(x).ln()).sqrt()
 }
 
 pub(crate) fn exact_circle(y: u32) -> [f64; 2] {
-    let (sine, cosine) = ((f64::from(y) + 0.5) / 2f64.powi(32) * TAU).sin_cos();
+    let (sine, cosine) = (exact_uniform(y) * TAU).sin_cos();
     [cosine, sine]
 }
 

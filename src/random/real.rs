@@ -94,7 +94,7 @@ impl DrawOperations for f64 {
     }
 
     fn uniform(x: u32) -> f64 {
-        (f64::from(x) + 0.5) * 2f64.powi(-32)
+        log_uniform::exact_uniform(x)
     }
 
     fn exp2(self) -> f64 {
@@ -107,5 +107,28 @@ impl DrawOperations for f64 {
 
     fn chi_square(word: u32) -> f64 {
         truncated::exact_chi_square(word)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Words, and their normals and chi-square in 40 digits.
+    #[test]
+    fn the_oracle_is_right_to_the_last_digits() {
+        let table = [
+            ([0, 0], [6.7637056350018952, 4.9473736281427186e-9], 45.74771391695639),
+            ([0x1234_5678, 0x9ABC_DEF0], [-1.8217534546447058, -1.4029389548741235], 5.2870233606132178),
+            ([0x9ABC_DEF0, 0x4000_0000], [-7.339749715792703e-10, 1.0034396074275749], 1.0068910457544056),
+            ([!0, !0], [1.5258789062944089e-5, -1.1161179193952455e-14], 2.3283064366742216e-10),
+        ];
+        for ([x, y], normals, chi_square) in table {
+            // An angle near a multiple of pi/2 has the absolute error of its own rounding.
+            for (value, exact) in f64::normal_pair(x, y).into_iter().zip(normals) {
+                assert!((value - exact).abs() <= 1e-15 * exact_radius(x), "{x:#x} {y:#x}: {value} {exact}");
+            }
+            assert!((f64::chi_square(x) / chi_square - 1.0).abs() < 1e-15, "{x:#x}");
+        }
     }
 }

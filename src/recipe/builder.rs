@@ -3,8 +3,8 @@
 use super::outputs::{Aim, OutputRequest, outputs};
 use super::pilot::{TOLERABLE_FAILURE, failure, pilot, pilot_of_draws};
 use super::{
-    CoverSize, DEFAULT_MAX_ATTEMPTS, Intensity, Lrv, ProposalKind, Recipe, RecipeError, RecipeSettings,
-    ResponseTarget, XyzScale,
+    CoverSize, DEFAULT_MAX_ATTEMPTS, Intensity, Lrv, PointlessSetting, ProposalKind, Recipe, RecipeError,
+    RecipeSettings, ResponseTarget, XyzScale,
 };
 use crate::affine::Affine;
 use crate::colorimetry::{Illuminant, Observer};
@@ -269,8 +269,7 @@ impl RecipeBuilder {
             return Err(RecipeError::MaxAttempts(self.max_attempts));
         }
         if self.bounds.is_some() && self.lrv.is_none() && self.target.is_none() {
-            let (setting, needs) = ("a choice of bounds", "a target luminous reflectance");
-            return Err(RecipeError::Pointless { setting, needs });
+            return Err(RecipeError::Pointless(PointlessSetting::Bounds));
         }
         let target = self.scaling()?;
         let mut weights = self.model.weight_map(self.covariance_scale);

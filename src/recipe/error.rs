@@ -1,5 +1,7 @@
 //! Errors of recipes.
 
+use std::fmt::{self, Display, Formatter};
+
 use super::pilot::{PILOT, TOLERABLE_FAILURE, failure};
 use crate::colorimetry::IlluminantError;
 use crate::cover::MOST_COMPONENTS;
@@ -135,13 +137,50 @@ pub enum RecipeError {
          less extreme spectra, or use the Gaussian model of the same data"
     )]
     NoCentres { name: &'static str, count: usize },
-    #[error("{setting} needs {needs}")]
-    Pointless { setting: &'static str, needs: &'static str },
+    #[error("{0}")]
+    Pointless(PointlessSetting),
     #[error(
         "too few candidates would be accepted: {}",
         hopeless(*acceptance, *max_attempts, "ask for less extreme spectra")
     )]
     Hopeless { acceptance: f64, max_attempts: u32 },
+}
+
+/// A setting that changes nothing without another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+#[allow(missing_docs)] // the messages say what they are
+pub enum PointlessSetting {
+    Bounds,
+    Illuminant,
+    Observer,
+    Sensors,
+    ResponseScale,
+    WhiteResponseScale,
+    XyzScale,
+}
+
+impl Display for PointlessSetting {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            PointlessSetting::Bounds => "a choice of bounds needs a target luminous reflectance",
+            PointlessSetting::Illuminant => {
+                "an illuminant for reflectances needs the quantity xyz, chromaticity, linear_srgb, lrv or responses of \
+                 reflectances"
+            }
+            PointlessSetting::Observer => {
+                "an observer needs the quantity xyz, chromaticity, linear_srgb or lrv, or a target of these"
+            }
+            PointlessSetting::Sensors => "a set of sensors needs the quantity responses",
+            PointlessSetting::ResponseScale => "a scale of responses needs the quantity responses",
+            PointlessSetting::WhiteResponseScale => {
+                "a scale of responses relative to white needs reflectances: illuminants have none"
+            }
+            PointlessSetting::XyzScale => {
+                "a scale of tristimulus values needs the quantity xyz or linear_srgb of illuminants"
+            }
+        })
+    }
 }
 
 impl From<SensorError> for RecipeError {

@@ -10,7 +10,7 @@ mod settings;
 mod target;
 
 pub use builder::RecipeBuilder;
-pub use error::RecipeError;
+pub use error::{PointlessSetting, RecipeError};
 pub(crate) use outputs::OutputRequest;
 pub use scalar::{Draw, ScalarSampler};
 pub use settings::RecipeSettings;

@@ -1,6 +1,6 @@
 //! Outputs of a program from the quantities that a recipe asks for: each as a map of the normals, folded in f64.
 
-use super::{RecipeError, XyzScale};
+use super::{PointlessSetting, RecipeError, XyzScale};
 use crate::affine::Affine;
 use crate::colorimetry::{self, Illuminant, Observer};
 use crate::dataset::SpectrumKind;
@@ -64,44 +64,34 @@ impl Default for OutputRequest {
 impl OutputRequest {
     /// Refuses settings that would change nothing.
     fn check(&self, kind: SpectrumKind) -> Result<(), RecipeError> {
-        let pointless = |setting, needs| Err(RecipeError::Pointless { setting, needs });
         let wants = |list: &[Quantity]| self.quantities.iter().any(|quantity| list.contains(quantity));
         let is_reflectance = kind == SpectrumKind::Reflectance;
         let has_colours = wants(Quantity::COLOURS) || wants(&[Quantity::Lrv]);
         let has_responses = wants(&[Quantity::Responses]);
         let is_lit = has_colours || has_responses || self.aim != Aim::Nothing;
-        if self.illuminant.is_some() && !(is_reflectance && is_lit) {
-            return pointless(
-                "an illuminant for reflectances",
-                "the quantity xyz, chromaticity, linear_srgb, lrv or responses of reflectances",
-            );
+        let settings = [
+            (PointlessSetting::Illuminant, self.illuminant.is_some() && !(is_reflectance && is_lit)),
+            (
+                PointlessSetting::Observer,
+                self.observer.is_some() && !(has_colours || matches!(self.aim, Aim::Lrv | Aim::Xyz)),
+            ),
+            (PointlessSetting::Sensors, self.sensors.is_some() && !has_responses),
+            (PointlessSetting::ResponseScale, self.response_scale.is_some() && !has_responses),
+            (
+                PointlessSetting::WhiteResponseScale,
+                self.response_scale == Some(ResponseScale::White) && !is_reflectance,
+            ),
+            // A chromaticity is the same in every scale.
+            (
+                PointlessSetting::XyzScale,
+                self.xyz_scale.is_some()
+                    && (is_reflectance || !wants(&[Quantity::Xyz, Quantity::LinearSrgb])),
+            ),
+        ];
+        match settings.into_iter().find(|(_, is_pointless)| *is_pointless) {
+            Some((setting, _)) => Err(RecipeError::Pointless(setting)),
+            None => Ok(()),
         }
-        if self.observer.is_some() && !(has_colours || matches!(self.aim, Aim::Lrv | Aim::Xyz)) {
-            return pointless(
-                "an observer",
-                "the quantity xyz, chromaticity, linear_srgb or lrv, or a target of these",
-            );
-        }
-        if self.sensors.is_some() && !has_responses {
-            return pointless("a set of sensors", "the quantity responses");
-        }
-        if self.response_scale.is_some() && !has_responses {
-            return pointless("a scale of responses", "the quantity responses");
-        }
-        if self.response_scale == Some(ResponseScale::White) && !is_reflectance {
-            return pointless(
-                "a scale of responses relative to white",
-                "reflectances: illuminants have none",
-            );
-        }
-        // A chromaticity is the same in every scale.
-        if self.xyz_scale.is_some() && (is_reflectance || !wants(&[Quantity::Xyz, Quantity::LinearSrgb])) {
-            return pointless(
-                "a scale of tristimulus values",
-                "the quantity xyz or linear_srgb of illuminants",
-            );
-        }
-        Ok(())
     }
 
     pub(crate) fn observer(&self) -> Observer {

@@ -10,7 +10,9 @@ use crate::program::condition::Condition;
 use crate::program::{Bounds, LrvLaw, LrvTarget, Program};
 use crate::random::real::DrawOperations;
 use crate::random::stream::{self, Stream};
-use crate::recipe::{DEFAULT_MAX_ATTEMPTS, ProposalKind, Recipe, RecipeBuilder, RecipeError};
+use crate::recipe::{
+    DEFAULT_MAX_ATTEMPTS, PointlessSetting, ProposalKind, Recipe, RecipeBuilder, RecipeError,
+};
 
 use super::error::SceneErrorKind;
 use super::group::{Copies, Hue, LrvLevels, TargetConstraint, Targets, Viewing};
@@ -356,11 +358,12 @@ pub(super) fn key(error: &RecipeError) -> &'static str {
         RecipeError::Invisible(_) => "wavelengths",
         RecipeError::Sensors(_) => "sensors",
         RecipeError::Illuminant(_) | RecipeError::DarkLight | RecipeError::Light { .. } => "illuminant",
-        RecipeError::Pointless { setting: "an illuminant for reflectances", .. } => "illuminant",
-        RecipeError::Pointless { setting: "an observer", .. } => "observer",
-        RecipeError::Pointless { setting, .. } if setting.starts_with("a scale of responses") => {
-            "response_scale"
-        }
+        RecipeError::Pointless(setting) => match setting {
+            PointlessSetting::Illuminant => "illuminant",
+            PointlessSetting::Observer => "observer",
+            PointlessSetting::ResponseScale | PointlessSetting::WhiteResponseScale => "response_scale",
+            _ => "",
+        },
         _ => "",
     }
 }
