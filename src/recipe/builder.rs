@@ -1,23 +1,24 @@
 //! Construction of recipes, and the checks that they can be drawn.
 
+mod condition;
+mod proposal;
+mod target;
+
+pub(super) use proposal::OWN_TARGETS;
+
 use super::outputs::{Aim, OutputRequest, outputs};
-use super::pilot::{TOLERABLE_FAILURE, failure, pilot, pilot_of_draws};
 use super::{
-    CoverSize, DEFAULT_MAX_ATTEMPTS, Intensity, Lrv, PointlessSetting, ProposalKind, Recipe, RecipeError,
+    DEFAULT_MAX_ATTEMPTS, Intensity, Lrv, PointlessSetting, ProposalKind, Recipe, RecipeError,
     RecipeSettings, ResponseTarget, XyzScale,
 };
 use crate::affine::Affine;
 use crate::colorimetry::{Illuminant, Observer};
-use crate::cover::Cover;
-use crate::cover::HalfSpace;
 use crate::dataset::SpectrumKind;
-use crate::mixture::Centres;
-use crate::model::{Distribution, Model};
+use crate::model::Model;
 use crate::program::condition::Condition;
-use crate::program::feasibility::{self, Room};
-use crate::program::{Bounds, IntensityLaw, LrvLaw, LrvTarget, Program, Proposal};
+use crate::program::{Bounds, IntensityLaw, Program};
 use crate::quantity::{Dtype, Layout, Quantity};
-use crate::sensors::{ResponseScale, SensorError, Sensors};
+use crate::sensors::{ResponseScale, Sensors};
 
 /// A recipe under construction.
 #[derive(Clone, Debug)]
@@ -221,23 +222,7 @@ impl RecipeBuilder {
     /// a pilot run accepts enough candidates.
     pub fn build(self) -> Result<Recipe, RecipeError> {
         let program = self.program()?;
-        if program.given > 0 {
-            return self.given_its_own(program);
-        }
-        let half_spaces = feasibility::half_spaces(&program);
-        let centre = self.centre(&program, &half_spaces)?;
-        if let Some(centres) = self.model.centres() {
-            return self.about_centres(program, centres, &half_spaces);
-        }
-        if program.tests_own_targets() {
-            return self.reject_by_own_targets(program);
-        }
-        let max_attempts = program.max_attempts;
-        let recipe = self.propose(program, &half_spaces, centre)?;
-        if failure(recipe.acceptance, max_attempts) > TOLERABLE_FAILURE {
-            return Err(RecipeError::Hopeless { acceptance: recipe.acceptance, max_attempts });
-        }
-        Ok(recipe)
+        self.with_proposal(program)
     }
 
     fn settings(&self) -> RecipeSettings {
@@ -299,237 +284,6 @@ impl RecipeBuilder {
         Ok(program)
     }
 
-    /// A point in the middle of the accepted region; `None` where that is for the pilot run to find out.
-    fn centre(&self, program: &Program, half_spaces: &[HalfSpace]) -> Result<Option<Vec<f64>>, RecipeError> {
-        if let Some(target) = &program.target {
-            let lrv = target.lrv.largest();
-            let largest = feasibility::largest_lrv(program, &target.weights);
-            if let Some(largest) = largest.filter(|&largest| lrv >= largest) {
-                return Err(match &self.target {
-                    None => RecipeError::UnreachableLrv { lrv, largest },
-                    Some(target) => {
-                        RecipeError::UnreachableResponse { sensor: target.sensor(), response: lrv, largest }
-                    }
-                });
-            }
-        }
-        match (feasibility::room(half_spaces), self.xyz) {
-            (Room::Ball { centre, .. }, _) => Ok(Some(centre)),
-            (Room::Unknown, _) => Ok(None),
-            (Room::None { .. }, Some(xyz)) => {
-                Err(RecipeError::UnreachableXyz { xyz, nearest: self.nearest(xyz) })
-            }
-            (Room::None { bands }, None) => {
-                let wavelengths = bands.into_iter().map(|band| self.model.grid().wavelength(band)).collect();
-                Err(RecipeError::Empty { wavelengths })
-            }
-        }
-    }
-
-    /// The recipe with the proposal that was asked for, or is expected to cost less.
-    fn propose(
-        self,
-        program: Program,
-        half_spaces: &[HalfSpace],
-        centre: Option<Vec<f64>>,
-    ) -> Result<Recipe, RecipeError> {
-        let settings = self.settings();
-        let (may_be_plain, may_be_covered) = match self.proposal {
-            ProposalKind::Auto => (true, true),
-            ProposalKind::Plain => (true, false),
-            ProposalKind::Cover => (false, true),
-        };
-        let plain = if may_be_plain { pilot(&program) } else { 0.0 };
-        if may_be_covered
-            && (!may_be_plain || Cover::could_pay(plain))
-            && let Some(cover) = centre.and_then(|centre| Cover::new(half_spaces, &centre))
-        {
-            let covered = program.clone().covered(&cover);
-            let acceptance = pilot(&covered);
-            if Cover::pays(acceptance, plain) {
-                let probability = acceptance * cover.mass();
-                let cover = Some(CoverSize { boxes: cover.len(), bytes: cover.proposal().bytes() });
-                return Ok(Recipe {
-                    settings,
-                    model: self.model,
-                    program: covered,
-                    probability,
-                    acceptance,
-                    cover,
-                    left_out: 0,
-                });
-            }
-        } else if !may_be_plain {
-            return Err(RecipeError::NoCover { components: program.components() });
-        }
-        Ok(Recipe {
-            settings,
-            model: self.model,
-            program,
-            probability: plain,
-            acceptance: plain,
-            cover: None,
-            left_out: 0,
-        })
-    }
-
-    /// The recipe of a model whose weights are distributed about centres. What accepts or changes a part of them alone
-    /// would change their shares, and is refused.
-    fn about_centres(
-        self,
-        program: Program,
-        centres: Centres,
-        half_spaces: &[HalfSpace],
-    ) -> Result<Recipe, RecipeError> {
-        let name = self.model.distribution().name();
-        let others = [
-            ("target tristimulus values", self.xyz.is_some()),
-            ("a cover", self.proposal == ProposalKind::Cover),
-            (OWN_TARGETS, program.tests_own_targets()),
-        ];
-        if let Some((other, _)) = others.into_iter().find(|(_, is_set)| *is_set) {
-            return Err(RecipeError::CentresAnd { name, other });
-        }
-        let (count, unit) = (centres.shares.len(), centres.unit());
-        let (mixture, left_out) =
-            centres.within(half_spaces).ok_or(RecipeError::NoCentres { name, count })?;
-        let program = Program { proposal: Some(Proposal::Centres(mixture)), ..program.in_units(unit) };
-        let (acceptance, max_attempts) = (pilot(&program), program.max_attempts);
-        if failure(acceptance, max_attempts) > TOLERABLE_FAILURE {
-            return Err(RecipeError::Hopeless { acceptance, max_attempts });
-        }
-        Ok(Recipe {
-            settings: self.settings(),
-            model: self.model,
-            program,
-            probability: acceptance,
-            acceptance,
-            cover: None,
-            left_out,
-        })
-    }
-
-    /// The recipe of plain rejection where the target of each draw bounds its spectrum. A cover is of one region, and
-    /// each target has its own, so what plain rejection cannot draw at the hardest target is refused.
-    fn reject_by_own_targets(self, program: Program) -> Result<Recipe, RecipeError> {
-        let own = self.lrv.or(self.target.as_ref().map(|target| target.response));
-        let Some(Lrv::Uniform(low, high)) = own else { unreachable!("the program has targets of draws") };
-        let sensor = self.target.as_ref().map(ResponseTarget::sensor);
-        if self.proposal == ProposalKind::Cover {
-            let what = sensor.map_or("luminous reflectance".to_owned(), |of| format!("response of {of}"));
-            return Err(RecipeError::CoverOfLrvRange { what: what.into(), low, high });
-        }
-        let (hardest, max_attempts) = (pilot(&program.at_largest_target()), program.max_attempts);
-        if failure(hardest, max_attempts) > TOLERABLE_FAILURE {
-            let what = sensor.map_or("luminous reflectances".to_owned(), |of| format!("responses of {of}"));
-            let what = what.into();
-            return Err(RecipeError::HopelessLrvRange { what, low, high, acceptance: hardest, max_attempts });
-        }
-        Ok(Recipe {
-            settings: self.settings(),
-            probability: pilot(&program),
-            acceptance: pilot_of_draws(&program, hardest),
-            model: self.model,
-            program,
-            cover: None,
-            left_out: 0,
-        })
-    }
-
-    /// The recipe of draws that are given responses, tried at those of the model's mean.
-    fn given_its_own(self, program: Program) -> Result<Recipe, RecipeError> {
-        let sensors = self.given.as_ref().expect("the program is given responses");
-        let weights = self.model.weight_map(self.covariance_scale);
-        let mean = self.responses(sensors, &weights)?.offset;
-        let program_of_mean = program.at(&mean);
-        self.centre(&program_of_mean, &feasibility::half_spaces(&program_of_mean))?;
-        let acceptance = pilot(&program_of_mean);
-        Ok(Recipe {
-            settings: self.settings(),
-            probability: acceptance,
-            acceptance: acceptance.max(1.0 / f64::from(self.max_attempts)),
-            model: self.model,
-            program,
-            cover: None,
-            left_out: 0,
-        })
-    }
-
-    /// The program of the model's own Gaussian, and the map of the responses that draws are given.
-    pub(super) fn free(&self) -> Result<(Program, Affine), RecipeError> {
-        let weights = self.model.weight_map(self.covariance_scale);
-        let sensors = self.given.as_ref().expect("the recipe gives draws responses");
-        Ok((Program::new(&self.model, &weights), self.responses(sensors, &weights)?))
-    }
-
-    /// The map of the responses of sensors that draws are given.
-    fn responses(&self, sensors: &Sensors, weights: &Affine) -> Result<Affine, RecipeError> {
-        let others = [
-            ("a target luminous reflectance", self.lrv.is_some()),
-            ("a target response", self.target.is_some()),
-            ("target tristimulus values", self.xyz.is_some()),
-            ("an intensity", self.intensity.is_some()),
-            ("a cover", self.proposal == ProposalKind::Cover),
-        ];
-        if let Some((other, _)) = others.into_iter().find(|(_, is_set)| *is_set) {
-            return Err(RecipeError::GivenAnd { other });
-        }
-        if *self.model.distribution() != Distribution::Gaussian {
-            let (name, other) = (self.model.distribution().name(), "responses that each draw is given");
-            return Err(RecipeError::CentresAnd { name, other });
-        }
-        let grid = self.model.grid();
-        let seen = match self.model.kind() {
-            SpectrumKind::Illuminant => sensors.emitted_weights(grid)?,
-            SpectrumKind::Reflectance => {
-                sensors.reflected_weights(&self.outputs.light(grid)?, grid, ResponseScale::White)?
-            }
-        };
-        Ok(Program::new(&self.model, weights).spectrum.project(&seen))
-    }
-
-    fn too_few_directions(&self, sensors: &Sensors) -> RecipeError {
-        let (name, channels) = (sensors.name().to_owned(), sensors.len());
-        RecipeError::TooFewToGive { name, channels, components: self.model.components() }
-    }
-
-    /// Effect of the given tristimulus values on this model.
-    pub(crate) fn condition(&self, weights: &Affine) -> Result<Condition, RecipeError> {
-        if self.model.kind() == SpectrumKind::Illuminant {
-            return Err(RecipeError::XyzOfIlluminant);
-        }
-        if self.lrv.is_some() || self.target.is_some() {
-            return Err(RecipeError::XyzAndLrv);
-        }
-        let (_, map) = self.seen(weights)?;
-        Condition::new(&map).ok_or(RecipeError::TooFewDirections)
-    }
-
-    /// The program without a target, and the map of its tristimulus values.
-    fn seen(&self, weights: &Affine) -> Result<(Program, Affine), RecipeError> {
-        let seen = self.outputs.reflected_xyz_weights(self.model.grid())?;
-        let program = Program::new(&self.model, weights);
-        let xyz = program.spectrum.project(&seen);
-        Ok((program, xyz))
-    }
-
-    /// The nearest tristimulus values that can be drawn. The very nearest leave no room for a spectrum to vary in, so
-    /// these are a little of the way from there to those of the mean.
-    fn nearest(&self, xyz: [f64; 3]) -> Option<[f64; 3]> {
-        let weights = self.model.weight_map(self.covariance_scale);
-        let (program, map) = self.seen(&weights).ok()?;
-        let nearest = feasibility::nearest(&program, &map, &xyz)?;
-        let steps = (0..16).map(|doublings| 1e-4 * f64::from(1 << doublings)).take_while(|&part| part < 1.0);
-        let inwards = |part| [0, 1, 2].map(|i| nearest[i] + part * (map.offset[i] - nearest[i]));
-        let rounded = steps.map(inwards).map(|xyz| xyz.map(|v| (v * 1e4).round() / 1e4));
-        let condition = self.condition(&weights).ok()?;
-        rounded.into_iter().find(|&xyz| {
-            let program = Program::new(&self.model, &condition.given(&xyz, &weights));
-            !matches!(feasibility::room(&feasibility::half_spaces(&program)), Room::None { .. })
-                && failure(pilot(&program), self.max_attempts) <= TOLERABLE_FAILURE
-        })
-    }
-
     fn brighten(&self, program: Program, intensity: Intensity) -> Result<Program, RecipeError> {
         if self.model.kind() == SpectrumKind::Reflectance {
             return Err(RecipeError::IntensityOfReflectance);
@@ -564,74 +318,6 @@ impl RecipeBuilder {
             (None, None, Some(_)) => Aim::Xyz,
             (None, None, None) => Aim::Nothing,
         }
-    }
-
-    /// The target that spectra are scaled to.
-    fn scaling(&self) -> Result<Option<LrvTarget>, RecipeError> {
-        let bounds = self.bounds.unwrap_or_default();
-        match (self.lrv, &self.target) {
-            (None, None) => Ok(None),
-            (Some(_), Some(target)) => Err(RecipeError::TwoTargets { sensor: target.sensor() }),
-            (Some(lrv), None) => {
-                let law = law(lrv, RecipeError::Lrv, |low, high| RecipeError::LrvRange { low, high })?;
-                if self.model.kind() == SpectrumKind::Illuminant {
-                    return Err(RecipeError::LrvOfIlluminant);
-                }
-                let [_, weights, _] = self.outputs.reflected_xyz_weights(self.model.grid())?;
-                Ok(Some(LrvTarget { lrv: law, weights, bounds }))
-            }
-            (None, Some(target)) => {
-                let sensor = || target.sensor();
-                let law = law(
-                    target.response,
-                    |response| RecipeError::Response { sensor: sensor(), response },
-                    |low, high| RecipeError::ResponseRange { sensor: sensor(), low, high },
-                )?;
-                if self.model.kind() == SpectrumKind::Illuminant {
-                    return Err(RecipeError::ResponseOfIlluminant { sensor: sensor() });
-                }
-                Ok(Some(LrvTarget { lrv: law, weights: self.response_weights(target)?, bounds }))
-            }
-        }
-    }
-
-    /// The weights of the bands in the response that is aimed at.
-    fn response_weights(&self, target: &ResponseTarget) -> Result<Vec<f64>, RecipeError> {
-        let grid = self.model.grid();
-        let channel = target.sensors.channel(&target.channel)?;
-        let light = self.outputs.light(grid)?;
-        let mut weights = target.sensors.reflected_weights(&light, grid, ResponseScale::White)?;
-        let weights = weights.swap_remove(channel);
-        // Where a weight is negative, a spectrum that is positive may have a response that no factor takes to the target.
-        if let Some(band) = weights.iter().position(|weight| *weight < 0.0) {
-            return Err(RecipeError::from(SensorError::Negative {
-                name: target.sensors.name().to_owned(),
-                channel: target.channel.clone(),
-                wavelength: grid.wavelength(band),
-            }));
-        }
-        Ok(weights)
-    }
-}
-
-/// Setting under which the acceptance about a centre differs from draw to draw.
-pub(super) const OWN_TARGETS: &str = "bounds on what is scaled to a target of each draw's own";
-
-/// The law of a target, if its values are those of one.
-fn law(
-    target: Lrv,
-    value: impl Fn(f64) -> RecipeError,
-    range: impl Fn(f64, f64) -> RecipeError,
-) -> Result<LrvLaw, RecipeError> {
-    // Far below, spectra would round to 0; just below 1, to 1.
-    let check = |target: f64| match (1e-30..1.0).contains(&f64::from(target as f32)) {
-        true => Ok(target),
-        false => Err(value(target)),
-    };
-    match target {
-        Lrv::Fixed(fixed) => Ok(LrvLaw::Fixed(check(fixed)?)),
-        Lrv::Uniform(low, high) if check(low)? < check(high)? => Ok(LrvLaw::uniform(low, high)),
-        Lrv::Uniform(low, high) => Err(range(low, high)),
     }
 }
 
