@@ -1,7 +1,5 @@
 """The same draws as one would write them in Python: spectra of a Gaussian model, kept where all bands are physical.
 
-    peers.py MODEL.json numpy|numba|torch [COUNT [OUT.npy]]
-
 With COUNT it prints million spectra a second, the best of three runs; with OUT.npy it fills that file once, and prints
 nothing. Without, it answers requests: for each line "COUNT SEED" on standard input it draws, in blocks, and writes the
 blocks, each a line "ROWS" and the values in 32 bits, and at last a line "0 SECONDS CANDIDATES". The first line that it
@@ -9,6 +7,8 @@ writes describes it, as JSON. Only the drawing is timed. Torch draws on the grap
 COUNT leaves the spectra there.
 """
 
+import argparse
+import importlib
 import json
 import signal
 import sys
@@ -164,16 +164,27 @@ def serve(model, fill, peer):
         say(f"0 {seconds!r} {candidates}")
 
 
-def main():
-    path, peer, *rest = sys.argv[1:]
-    model = Model(path)
-    fill, empty = {"numpy": with_numpy, "numba": with_numba, "torch": with_torch}[peer](model)
-    if not rest:
-        serve(model, fill, peer)
+PEERS = {"numpy": with_numpy, "numba": with_numba, "torch": with_torch}
+
+
+def arguments():
+    about = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    about.add_argument("model", metavar="MODEL.json", help="a model as `spectroll fit` writes it, of one Gaussian")
+    about.add_argument("peer", choices=PEERS)
+    about.add_argument("count", metavar="COUNT", nargs="?", type=lambda text: int(float(text)))
+    about.add_argument("out", metavar="OUT.npy", nargs="?")
+    return about.parse_args()
+
+
+def main(asked):
+    model = Model(asked.model)
+    fill, empty = PEERS[asked.peer](model)
+    if asked.count is None:
+        serve(model, fill, asked.peer)
         return
-    shape = (int(float(rest[0])), len(model.mean))
-    if rest[1:]:
-        out = np.lib.format.open_memmap(rest[1], "w+", np.float32, shape)
+    shape = (asked.count, len(model.mean))
+    if asked.out:
+        out = np.lib.format.open_memmap(asked.out, "w+", np.float32, shape)
         fill(out, 1)
         out.flush()
         return
@@ -187,16 +198,14 @@ def main():
     print(max(rates))
 
 
+asked = arguments()
 try:
     import numpy as np
 
-    if sys.argv[2:3] == ["numba"]:
-        import numba
-    if sys.argv[2:3] == ["torch"]:
-        import torch
+    globals()[asked.peer] = importlib.import_module(asked.peer)
 except ImportError as error:
-    if sys.argv[3:]:
+    if asked.count is not None:
         sys.exit(str(error))
     say(json.dumps({"error": str(error)}))
     sys.exit()
-main()
+main(asked)
