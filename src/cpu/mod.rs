@@ -351,3 +351,57 @@ fn make_normals<R: Real, const L: usize>(normals: &mut [[R; L]], from: &mut impl
     }
     words
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::{BuiltinTable, Dataset, SpectrumKind};
+    use crate::grid::{Extrapolation, Grid};
+    use crate::model::{Fit, FitDistribution};
+    use crate::recipe::Recipe;
+
+    /// Two words make each pair of normals, and the next chooses the centre: a word that served two choices would make
+    /// them depend on each other.
+    #[test]
+    fn no_word_serves_two_choices() {
+        let data = Dataset::new(&[BuiltinTable::Vrhel.table()], Grid::DEFAULT, Extrapolation::Error);
+        let data = data.expect("the table has these wavelengths");
+        let distributions =
+            [FitDistribution::Gaussian, FitDistribution::Kernel(Some(0.5)), FitDistribution::Mixture(3)];
+        for (distribution, k) in distributions.into_iter().flat_map(|d| (1..=9).map(move |k| (d, k))) {
+            let fit = Fit::new(SpectrumKind::Reflectance).components(k).distribution(distribution);
+            let model = fit.fit(&data).expect("surfaces can be fitted");
+            let recipe = Recipe::builder(&model).build().expect("the model can be drawn");
+            let kernel = Kernel::<f64>::new(recipe.program());
+            let pairs = k.next_multiple_of(2);
+            let mut moved = vec![vec![false; k]; 4 * 4];
+            for index in 0..50 {
+                let words: Vec<[u32; 4]> =
+                    (0..4).map(|block| Stream::new(9).block(index, 0, block)).collect();
+                let propose = |words: &[[u32; 4]]| {
+                    let mut candidates = kernel.candidates::<1>();
+                    kernel.propose(&mut candidates, |block: u32| words[block as usize]);
+                    candidates.normals
+                };
+                let normals = propose(&words);
+                for (word, moved) in moved.iter_mut().enumerate() {
+                    let mut changed = words.clone();
+                    changed[word / 4][word % 4] ^= 0xA5A5_5A5A;
+                    let other = propose(&changed);
+                    moved.iter_mut().enumerate().for_each(|(j, moved)| *moved |= other[j] != normals[j]);
+                }
+            }
+            // A factor is lower triangular: a normal moves its own coordinate and those after it.
+            let reach = |pair: usize| if distribution == FitDistribution::Mixture(3) { k } else { pair + 2 };
+            for (word, moved) in moved.iter().enumerate() {
+                let expected: Vec<bool> = match word {
+                    _ if word < pairs => {
+                        (0..k).map(|j| (word / 2 * 2..reach(word / 2 * 2)).contains(&j)).collect()
+                    }
+                    _ => vec![word == pairs && distribution != FitDistribution::Gaussian; k],
+                };
+                assert_eq!(moved, &expected, "word {word} of {k} components, {distribution:?}");
+            }
+        }
+    }
+}

@@ -155,3 +155,43 @@ fn turned(normal: &[f64], factor: &[f64]) -> Vec<f64> {
     let k = normal.len();
     (0..k).map(|i| (i..k).map(|j| normal[j] * factor[triangle(j) + i]).sum()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use statrs::distribution::{ContinuousCDF, Normal};
+
+    /// Two centres with a spread for all, and the same with factors of their own: the same candidates, and the share that
+    /// the normal distribution function says.
+    #[test]
+    fn acceptances_are_those_of_the_distribution_function() {
+        let (spread, room, normal) = (0.7, 0.5, [0.6, -1.1]);
+        let coordinates = vec![0.2, 0.3, 0.8, 0.4];
+        let of = |spread| {
+            let centres =
+                Centres { coordinates: coordinates.clone(), spread, shares: vec![0.5; 2], components: 2 };
+            acceptances(&centres, &[HalfSpace::new(0, normal.to_vec(), room)])
+        };
+        let exact = |centre: &[f64], gains: [f64; 2]| {
+            let above = room - (normal[0] * centre[0] + normal[1] * centre[1]);
+            Normal::standard().cdf(above / gains[0].hypot(gains[1]))
+        };
+        let same = of(Spread::Same(spread));
+        let diagonal = [spread, 0.0, spread];
+        assert_eq!(of(Spread::Own([diagonal, diagonal].concat())), same);
+        // Rows of a lower triangle: (a), (b, c).
+        let (a, b, c) = (0.9, -0.5, 0.4);
+        let turned = of(Spread::Own([diagonal, [a, b, c]].concat()));
+        assert_eq!(turned[0], same[0]);
+        for (found, centre, gains) in [
+            (same[0], &coordinates[..2], normal.map(|gain| spread * gain)),
+            (same[1], &coordinates[2..], normal.map(|gain| spread * gain)),
+            (turned[1], &coordinates[2..], [a * normal[0] + b * normal[1], c * normal[1]]),
+        ] {
+            let exact = exact(centre, gains);
+            assert!((0.05..0.95).contains(&exact));
+            // Four standard errors of 4,096 candidates.
+            assert!((found - exact).abs() < 4.0 * (exact * (1.0 - exact) / 4096.0).sqrt(), "{found} {exact}");
+        }
+    }
+}

@@ -147,6 +147,35 @@ mod tests {
         assert_eq!(bandwidth(&[0.5; 8], [1, 1], &[]), bandwidth(&[0.5; 9], [1, 1], &[]));
     }
 
+    /// What NumPy makes of the formula above: of both components, of the first alone, and of a narrow spread, where all but
+    /// the nearest term are nothing.
+    #[test]
+    fn the_likelihood_is_that_of_the_formula() {
+        let spectra = [[0.3, -1.2], [1.1, 0.4], [-0.7, 0.9], [2.0, 0.1]];
+        let spectra: Vec<&[f64]> = spectra.iter().map(<[f64; 2]>::as_slice).collect();
+        for (bandwidth, judged, expected) in
+            [(0.5, 2, -13.640101439212167), (0.5, 1, -6.42427601972722), (0.02, 2, -10583.498461150455)]
+        {
+            let found = log_likelihood(bandwidth, judged, &spectra, &spectra, &[]);
+            assert!((found / expected - 1.0).abs() < 1e-12, "{bandwidth} {judged}: {found}");
+        }
+    }
+
+    #[test]
+    fn one_spectrum_says_nothing_of_its_spread() {
+        assert_eq!(bandwidth(&[0.5], [1, 1], &[]), 1.0);
+        assert!(bandwidth(&[1.0, 1.01], [1, 1], &[]) < 0.5);
+    }
+
+    /// Of twice as many spectra every second is judged, and the bandwidth is smaller by 2^(1/5).
+    #[test]
+    fn more_spectra_than_are_judged_have_a_smaller_bandwidth() {
+        let values = normal(2 * MOST as u64);
+        let second: Vec<f64> = values.iter().copied().step_by(2).collect();
+        let (all, some) = (bandwidth(&values, [1, 1], &[]), bandwidth(&second, [1, 1], &[]));
+        assert!((all / some - 2f64.powf(-0.2)).abs() < 3e-3, "{all} {some}");
+    }
+
     /// A bound that cuts the data's density at its mode: what is judged is what is left of each normal distribution, so
     /// the bandwidth is about that of the same data without the bound, mirrored.
     #[test]

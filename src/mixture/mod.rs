@@ -224,3 +224,48 @@ impl<R: Real> Mixture<R> {
 pub(crate) fn triangle(rows: usize) -> usize {
     rows * (rows + 1) / 2
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Candidates by hand, of three centres with three coordinates, in two lanes.
+    #[test]
+    fn candidates_are_centres_and_factors_times_normals() {
+        let coordinates: Vec<f64> = (0..9).map(|i| f64::from(i) - 4.0).collect();
+        let factors: Vec<f64> = (0..18).map(|i| f64::from(i * i % 11) / 8.0).collect();
+        let normals = [[0.5, -1.0], [2.0, 0.25], [-1.5, 3.0]];
+        for spread in [Spread::Same(0.5), Spread::Own(factors.clone())] {
+            let is_same = spread == Spread::Same(0.5);
+            let centres = Centres {
+                coordinates: coordinates.clone(),
+                spread,
+                shares: vec![0.2, 0.5, 0.3],
+                components: 3,
+            };
+            let (mixture, left_out) = centres.within(&[]).expect("nothing is rejected");
+            assert_eq!(
+                (mixture.len(), left_out, mixture.rows_of_each()),
+                (3, 0, if is_same { 1 } else { 3 })
+            );
+            let mut seen = [false; 3];
+            for words in (0..64u32).map(|i| [i << 26, (i ^ 37) << 26]) {
+                let mut placed = normals;
+                mixture.place(&mut placed, &words);
+                for l in 0..2 {
+                    let centre = mixture.alias.choose(words[l]) as usize;
+                    seen[centre] = true;
+                    let c = &coordinates[3 * centre..][..3];
+                    for j in 0..3 {
+                        let row = &factors[6 * centre + triangle(j)..][..j + 1];
+                        let turned: f64 =
+                            row.iter().zip(normals).map(|(gain, normal)| gain * normal[l]).sum();
+                        let expected = if is_same { c[j] / 0.5 + normals[j][l] } else { c[j] + turned };
+                        assert_eq!(placed[j][l], expected, "coordinate {j} about centre {centre}");
+                    }
+                }
+            }
+            assert_eq!(seen, [true; 3]);
+        }
+    }
+}

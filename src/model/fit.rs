@@ -188,7 +188,7 @@ impl Fit {
         };
         let singular = values / scale;
         let largest = singular[0] * singular[0];
-        if largest == 0.0 || !largest.is_finite() {
+        if !largest.is_normal() {
             return Err(FitError::Scale);
         }
         // As MATLAB's and NumPy's rank: what rounding alone can leave is not a component.
@@ -365,6 +365,8 @@ mod tests {
             assert_eq!(rank(1.5 * tolerance, unit), Ok(2));
             assert_eq!(rank(0.5 * tolerance, unit), Err(FitError::Rank { components: 2, rank: 1 }));
         }
+        // Squares of these vanish.
+        assert_eq!(rank(1.0, 2f64.powi(-600)), Err(FitError::Scale));
     }
 
     #[test]

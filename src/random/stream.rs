@@ -328,6 +328,16 @@ mod tests {
     }
 
     #[test]
+    fn parts_have_their_own_responses() {
+        let given = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+        let draws = Draws::from(Stream::new(1).draws(5..9)).with_given(&given);
+        let part = draws.part(1, 2);
+        assert_eq!((part.range.first, part.given), (6, &given[2..6]));
+        assert_eq!(part.part(1, 1).given, &given[4..6]);
+        assert!(Draws::from(Stream::new(1).draws(5..9)).part(1, 2).given.is_empty());
+    }
+
+    #[test]
     fn lists_of_draws() {
         let stream = Stream::new(1);
         let list = stream.at(&[7, u64::MAX, 7]);
