@@ -1,6 +1,5 @@
 //! `spectroll metamers`: random spectra of given colours, into a data set.
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -17,7 +16,8 @@ use spectroll::{
 
 use super::exit::Usage;
 use super::options::{
-    EngineArguments, IlluminantSource, OutputArguments, Purpose, illuminant, looks_like_a_file, sensors,
+    EngineArguments, IlluminantSource, OutputArguments, Purpose, SummaryArguments, illuminant,
+    looks_like_a_file, sensors,
 };
 use super::parse::{attempts, count, seed};
 use super::run::{self, Waiting};
@@ -87,12 +87,8 @@ pub(crate) struct Arguments {
     ground: picture::Ground,
     #[command(flatten)]
     engine: EngineArguments,
-    /// Print the summary as JSON on standard output
-    #[arg(long)]
-    json: bool,
-    /// Do not print progress and summary
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    summary: SummaryArguments,
 }
 
 /// Result of a run, for people and programs.
@@ -118,10 +114,8 @@ const LISTED: usize = 10;
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = arguments.output.resolve(Purpose::Run)?;
-    if arguments.json && arguments.output.to_stdout() {
-        return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
-    }
-    let waiting = Waiting::begin("preparing the draws", arguments.quiet);
+    arguments.summary.check(&arguments.output)?;
+    let waiting = Waiting::begin("preparing the draws", arguments.summary.quiet);
     let model = model(arguments)?;
     let light = arguments.illuminant.on(model.grid())?;
     let (given, space) = given(arguments, model.grid())?;
@@ -155,7 +149,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let writing = interrupt::around(&output, || {
         Writing::open(&output, schema, &companions, &engine, &mut rows).map_err(run::failed)
     })?;
-    let outcome = run::make(writing, &mut rows, (arguments.quiet, arguments.output.to_stdout()))?;
+    let outcome = run::make(writing, &mut rows, (arguments.summary.quiet, arguments.output.to_stdout()))?;
     let seconds = start.elapsed().as_secs_f64();
     if let (Some(path), Some(format)) = (&arguments.preview, format) {
         preview(arguments, (path, format), &export, (&colours, &model, &engine))?;
@@ -173,7 +167,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         spectra_per_second: rows.counts.all() as f64 / seconds,
         engine: engine.to_string(),
     };
-    tell_report(arguments, (&output, outcome), &colours, &report)
+    arguments.summary.tell(&report, || tell_report((&output, outcome), &colours, &report))
 }
 
 /// The most rows and columns of an image in a preview, and the most spectra of a table.
@@ -357,19 +351,7 @@ fn check_size(each: u64, colours: &Colours) -> Result<(), Usage> {
     }
 }
 
-fn tell_report(
-    arguments: &Arguments,
-    (output, outcome): (&Output, SetStatus),
-    colours: &Colours,
-    report: &Report,
-) -> anyhow::Result<()> {
-    if arguments.json {
-        writeln!(io::stdout(), "{}", serde_json::to_string_pretty(report)?)?;
-        return Ok(());
-    }
-    if arguments.quiet {
-        return Ok(());
-    }
+fn tell_report((output, outcome): (&Output, SetStatus), colours: &Colours, report: &Report) {
     let AnswerCounts { sampled, mode, nearest, farthest, skipped, unreachable, .. } = report.answers;
     let what = match colours.shape {
         ColourShape::List => counted(report.colours, "colour", "colours"),
@@ -416,5 +398,4 @@ fn tell_report(
     if let Some(status) = run::status(output, outcome) {
         tell!("  {status}");
     }
-    Ok(())
 }

@@ -1,6 +1,5 @@
 //! `spectroll sample`: draws of a model, into a data set.
 
-use std::io::{self, Write};
 use std::path::Path;
 use std::time::Instant;
 
@@ -8,16 +7,15 @@ use serde::Serialize;
 use spectroll::export::{DrawExport, Output, Writing};
 use spectroll::output::SetStatus;
 use spectroll::wording::counted;
-use spectroll::{
-    ArithmeticVerdict, DrawRange, DrawSummary, EngineChoice, Grid, Recipe, Stream, wanted_backends,
-};
+use spectroll::{ArithmeticVerdict, DrawRange, DrawSummary, EngineChoice, Recipe, Stream, wanted_backends};
 
 use super::exit::Usage;
-use super::options::{EngineArguments, OutputArguments, Purpose, RecipeArguments};
+use super::interrupt;
+use super::options::{
+    EngineArguments, ModelArguments, OutputArguments, Purpose, RecipeArguments, SummaryArguments,
+};
 use super::parse::{count, seed};
 use super::run::{self, DryRun, Waiting};
-use super::wavelengths::grid;
-use super::{interrupt, model_at};
 
 /// Draw spectra from a model
 ///
@@ -25,13 +23,8 @@ use super::{interrupt, model_at};
 /// made again, or on another machine, with --start or --shard.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// A model file, or a name of `spectroll models`, such as munsell-vrhel or granada
-    #[arg(value_name = "MODEL")]
-    model: String,
-    /// The wavelengths of a built-in model, in nm, at which it is fitted: a grid, a list as in 443,490,560, or a file of
-    /// them [default: those of its name]
-    #[arg(long, value_name = "START:STEP:STOP|FILE", value_parser = grid)]
-    wavelengths: Option<Grid>,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Number of spectra (1000000, 1e6 and 1M are the same; k, M, G and T are powers of 1000)
     #[arg(short = 'n', long, value_name = "COUNT", value_parser = count, allow_negative_numbers = true)]
     count: u64,
@@ -53,12 +46,8 @@ pub(crate) struct Arguments {
     /// Say what would be made, how large it would be and how long it would take, and make nothing
     #[arg(long)]
     dry_run: bool,
-    /// Print the summary as JSON on standard output
-    #[arg(long)]
-    json: bool,
-    /// Do not print progress and summary
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    summary: SummaryArguments,
 }
 
 /// Result of a run, for people and programs.
@@ -94,8 +83,8 @@ struct Report {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = arguments.output.resolve(Purpose::of(arguments.dry_run))?;
-    let waiting = Waiting::begin("preparing the draws", arguments.quiet);
-    let model = model_at(&arguments.model, arguments.wavelengths.as_ref())?;
+    let waiting = Waiting::begin("preparing the draws", arguments.summary.quiet);
+    let model = arguments.model.load()?;
     check_size(arguments, model.bands())?;
     let recipe = arguments.request.recipe(&model)?;
     drop(waiting);
@@ -109,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let draws = DrawRange { stream, first: arguments.start, count: arguments.count };
     // A folder on this machine is nobody else's business.
-    let name = Path::new(&arguments.model).file_name().unwrap_or_default().to_string_lossy();
+    let name = Path::new(&arguments.model.model).file_name().unwrap_or_default().to_string_lossy();
     let export = DrawExport::new(&recipe, draws).model_name(&name).stream_name(arguments.stream.as_deref());
     let schema = export.schema(&output);
     let companions = export.companions();
@@ -117,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let engine = arguments.engine.open()?;
     if arguments.dry_run {
-        DryRun::new(&output, (&schema, &companions), &recipe, &engine)?.print(arguments.json)?;
+        DryRun::new(&output, (&schema, &companions), &recipe, &engine)?.print(arguments.summary.json)?;
         return Ok(output.check_space(&schema, &companions)?);
     }
     output.check_space(&schema, &companions)?;
@@ -135,7 +124,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let writing = interrupt::around(&output, || {
         Writing::open(&output, schema, &companions, &engine, &mut rows).map_err(run::failed)
     })?;
-    let outcome = run::make(writing, &mut rows, (arguments.quiet, arguments.output.to_stdout()))?;
+    let outcome = run::make(writing, &mut rows, (arguments.summary.quiet, arguments.output.to_stdout()))?;
     let summary = rows.summary;
     let seconds = start.elapsed().as_secs_f64();
     report(
@@ -143,7 +132,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &output,
         (&recipe, outcome),
         &Report {
-            model: arguments.model.clone(),
+            model: arguments.model.model.clone(),
             output: arguments.output.output.display().to_string(),
             files,
             bands: model.bands(),
@@ -171,9 +160,7 @@ fn report(
     (recipe, outcome): (&Recipe, SetStatus),
     made: &Report,
 ) -> anyhow::Result<()> {
-    if arguments.json {
-        writeln!(io::stdout(), "{}", serde_json::to_string_pretty(made)?)?;
-    } else if !arguments.quiet {
+    arguments.summary.tell(made, || {
         let DrawSummary { draws, attempts, above_one } = made.summary;
         let kind = run::kind(output, made.files);
         let spectra = counted(draws, "spectrum", "spectra");
@@ -196,15 +183,12 @@ fn report(
         if let Some(status) = run::status(output, outcome) {
             tell!("  {status}");
         }
-    }
-    Ok(())
+    })
 }
 
 /// Refuses what no index and no disk can hold, and two things on one output.
 fn check_size(arguments: &Arguments, bands: usize) -> Result<(), Usage> {
-    if arguments.json && arguments.output.to_stdout() {
-        return Err(Usage("--json and -o - would both write to standard output".to_owned()));
-    }
+    arguments.summary.check(&arguments.output)?;
     let past_the_end = arguments.count > 0 && arguments.start.checked_add(arguments.count - 1).is_none();
     if past_the_end {
         return Err(Usage(format!(

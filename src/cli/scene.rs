@@ -16,7 +16,7 @@ use spectroll::{ArithmeticVerdict, Distribution, Dtype, Engine, Quantity, Recipe
 
 use super::exit::Usage;
 use super::interrupt;
-use super::options::{EngineArguments, OutputArguments, Purpose};
+use super::options::{EngineArguments, OutputArguments, Purpose, SummaryArguments};
 use super::parse::{seed, size};
 use super::picture;
 use super::picture::scene::Preview;
@@ -60,12 +60,8 @@ pub(crate) struct Arguments {
     /// Say what would be drawn and what not, and draw nothing
     #[arg(long)]
     dry_run: bool,
-    /// Print the summary as JSON on standard output
-    #[arg(long)]
-    json: bool,
-    /// Do not print progress and summary
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    summary: SummaryArguments,
 }
 
 /// Result of a run, for people and programs.
@@ -118,7 +114,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let folder = arguments.file.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
     let selection = ArraySelection { only: arguments.only.clone(), arrays: arguments.arrays.clone() };
-    let waiting = Waiting::begin("preparing the scenes", arguments.quiet);
+    let waiting = Waiting::begin("preparing the scenes", arguments.summary.quiet);
     let scene = selection.apply(match arguments.seed {
         Some(seed) => Scene::parse_seeded(&name, &text, folder, seed)?,
         None => Scene::parse(&name, &text, folder)?,
@@ -243,9 +239,7 @@ impl Job<'_> {
 
     /// Plans the data set, if it can be written.
     fn planned(&self) -> anyhow::Result<Planned> {
-        if self.arguments.json && self.arguments.output.to_stdout() {
-            return Err(Usage("--json and -o - would both write to standard output".to_owned()).into());
-        }
+        self.arguments.summary.check(&self.arguments.output)?;
         let output = self.arguments.output.resolve(Purpose::of(self.arguments.dry_run))?;
         let (schema, companions) = (self.export.schema(&output), self.export.companions());
         output.check(&schema, &companions)?;
@@ -254,7 +248,7 @@ impl Job<'_> {
 
     /// Says what the seed is where it is not that of the file.
     fn tell_seed(&self) {
-        if self.arguments.seed.is_some() && !self.arguments.quiet && !self.arguments.json {
+        if self.arguments.seed.is_some() && self.arguments.summary.is_in_words() {
             tell!("  seed {}", self.scene.seed());
         }
     }
@@ -286,7 +280,7 @@ impl Job<'_> {
         if let Some(error) = picture.and_then(|picture| picture.make(self, engine).err()) {
             return Err(run::failed(writing.stop(ExportError::Host(error.into()))));
         }
-        let (quiet, to_stdout) = (self.arguments.quiet, self.arguments.output.to_stdout());
+        let (quiet, to_stdout) = (self.arguments.summary.quiet, self.arguments.output.to_stdout());
         let outcome = run::make(writing, &mut rows, (quiet, to_stdout))?;
         let seconds = start.elapsed().as_secs_f64();
         self.report(&output, outcome, Report { drawn: rows.drawn, files, seconds, ..self.workload(engine) })
@@ -300,9 +294,7 @@ impl Job<'_> {
             scenes_per_second: self.count() as f64 / seconds,
             ..made
         };
-        if self.arguments.json {
-            writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
-        } else if !self.arguments.quiet {
+        self.arguments.summary.tell(&report, || {
             let (scenes, bands) = (counted(self.count(), "scene", "scenes"), self.scene.grid().len());
             let kind = run::kind(output, report.files);
             let name = self.arguments.output.output.display();
@@ -332,8 +324,7 @@ impl Job<'_> {
             if let Some(status) = run::status(output, outcome) {
                 tell!("  {status}");
             }
-        }
-        Ok(())
+        })
     }
 
     /// Describes the workload of drawing, before anything is drawn.
@@ -380,7 +371,7 @@ impl Job<'_> {
             report.workload.bytes = bytes;
             report.room = Some(Room { least, free });
         }
-        if self.arguments.json {
+        if self.arguments.summary.json {
             writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&report)?)?;
         } else {
             self.print(report, planned)?;

@@ -5,12 +5,11 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use spectroll::output::write_file;
-use spectroll::{Arithmetic, Grid, ModuleOptions, TableStorage};
+use spectroll::{Arithmetic, ModuleOptions, TableStorage};
 
 use super::exit::Usage;
-use super::options::RecipeArguments;
-use super::wavelengths::grid;
-use super::{if_exists, model_at};
+use super::if_exists;
+use super::options::{ModelArguments, RecipeArguments};
 
 /// Print WGSL functions that draw spectra, for a shader of your own
 ///
@@ -22,13 +21,8 @@ use super::{if_exists, model_at};
 /// what came of it; PREFIX_BANDS, PREFIX_FIRST_NM and PREFIX_STEP_NM are the grid.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// A model file or the name of a built-in model
-    #[arg(value_name = "MODEL")]
-    model: String,
-    /// The wavelengths of a built-in model, in nm, at which it is fitted: a grid, a list as in 443,490,560, or a file of
-    /// them [default: those of its name]
-    #[arg(long, value_name = "START:STEP:STOP|FILE", value_parser = grid)]
-    wavelengths: Option<Grid>,
+    #[command(flatten)]
+    model: ModelArguments,
     #[command(flatten)]
     request: RecipeArguments,
     /// The arithmetic of the functions; in the exact one those that draw take one argument more, a zero that must be known
@@ -77,7 +71,7 @@ fn place(text: &str) -> Result<(u32, u32), String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let model = model_at(&arguments.model, arguments.wavelengths.as_ref())?;
+    let model = arguments.model.load()?;
     let recipe = arguments.request.recipe(&model)?;
     if arguments.force && arguments.output.is_none() && arguments.table_bytes.is_none() {
         return Err(Usage("--force needs --output or --table-bytes".to_owned()).into());
@@ -104,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         true => format!("#define_import_path spectroll::{}\n\n", arguments.prefix),
         false => String::new(),
     };
-    let (name, kind, version) = (&arguments.model, model.kind(), env!("CARGO_PKG_VERSION"));
+    let (name, kind, version) = (&arguments.model.model, model.kind(), env!("CARGO_PKG_VERSION"));
     let text = format!("{import}// {name} ({kind}): spectroll {version}\n{text}");
     match &arguments.output {
         Some(path) => write_file(path, if_exists(arguments.force), text.as_bytes())?,

@@ -22,12 +22,7 @@ static SURFACES: LazyLock<Model> = LazyLock::new(|| Model::builtin("munsell-vrhe
 fn program(lrv: Option<f64>, covariance_scale: f64) -> Program {
     let weights = lrv_weights(SURFACES.grid()).unwrap();
     let target = lrv.map(|lrv| LrvTarget { lrv: LrvLaw::Fixed(lrv), weights, bounds: Bounds::Scaled });
-    Program {
-        given: 0,
-        target,
-        max_attempts: 1000,
-        ..Program::new(&SURFACES, &SURFACES.weight_map(covariance_scale))
-    }
+    Program { target, max_attempts: 1000, ..Program::new(&SURFACES, &SURFACES.weight_map(covariance_scale)) }
 }
 
 fn cover_of(program: &Program, boxes: usize) -> Cover {
@@ -389,11 +384,7 @@ fn what_pays_is_what_costs_less() {
 /// A region without corners to cover: of one component, and of none of those there are.
 #[test]
 fn intervals_and_free_axes_are_covered() {
-    let one = |gain: Vec<Vec<f64>>| Program {
-        given: 0,
-        spectrum: Affine { offset: vec![0.5; 3], gain },
-        ..Program::new(&SURFACES, &SURFACES.weight_map(1.0))
-    };
+    let one = |gain| Program::of(SpectrumKind::Reflectance, Affine { offset: vec![0.5; 3], gain });
     // |z| < 2.5, of probability 0.98758.
     let interval = cover_of(&one(vec![vec![0.1, 0.2, -0.1]]), BOXES);
     assert_eq!(interval.len(), 1);

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::provenance::{Sum, model_sum, shader_sum};
 use super::{Companions, ExportError, Output, Rows, Window, Writing};
 use crate::engine::{Batch, DrawSummary, Engine, EngineError, Session};
-use crate::output::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
+use crate::output::{Field, LrvLabel, Schema, SharedArray};
 use crate::quantity::{ArrayFormat, Quantity};
 use crate::random::stream::{DrawRange, Stream};
 use crate::recipe::{Lrv, Recipe};
@@ -56,18 +56,12 @@ impl<'a> DrawExport<'a> {
 
     /// Files beside the rows.
     pub fn companions(&self) -> Companions {
-        let spectra = SpectraArray {
-            name: Quantity::Spectra.name().to_owned(),
-            group: None,
-            kind: self.recipe.model().kind(),
-            lrv: match self.recipe.settings().lrv {
-                Some(Lrv::Fixed(lrv)) => LrvLabel::Same(lrv),
-                Some(Lrv::Uniform(..)) => LrvLabel::Field(Quantity::Lrv.name().to_owned()),
-                None => LrvLabel::None,
-            },
+        let lrv = match self.recipe.settings().lrv {
+            Some(Lrv::Fixed(lrv)) => LrvLabel::Same(lrv),
+            Some(Lrv::Uniform(..)) => LrvLabel::Field(Quantity::Lrv.name().to_owned()),
+            None => LrvLabel::None,
         };
-        let files = vec![("_model.json", self.recipe.model().to_json())];
-        Companions { spectra: vec![spectra], first: self.draws.first, files }
+        Companions::of_recipe(self.recipe, lrv, self.draws.first)
     }
 
     /// Prepares the rows, to be drawn by an engine.

@@ -9,7 +9,7 @@ use super::provenance::{Sum, model_sum, shader_sum};
 use super::{Companions, ExportError, Output, Rows, Window, Writing};
 use crate::engine::{Engine, EngineError};
 use crate::metamers::{AnswerCounts, HardColours, MetamerError, Metamers, UnreachableColours};
-use crate::output::{Field, LrvLabel, Schema, SharedArray, SpectraArray};
+use crate::output::{Field, LrvLabel, Schema, SharedArray};
 use crate::quantity::{Dtype, Quantity};
 use crate::random::stream::Stream;
 use crate::recipe::Recipe;
@@ -169,14 +169,7 @@ impl<'a> MetamerExport<'a> {
 
     /// Files beside the rows.
     pub fn companions(&self) -> Companions {
-        let spectra = SpectraArray {
-            name: Quantity::Spectra.name().to_owned(),
-            group: None,
-            kind: self.recipe.model().kind(),
-            lrv: LrvLabel::None,
-        };
-        let files = vec![("_model.json", self.recipe.model().to_json())];
-        Companions { spectra: vec![spectra], first: 0, files }
+        Companions::of_recipe(self.recipe, LrvLabel::None, 0)
     }
 
     /// Prepares the rows, to be drawn by an engine.

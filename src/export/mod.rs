@@ -38,7 +38,9 @@ pub use space::{Space, SpaceCheck};
 pub use writing::{ExportError, Writing};
 
 use crate::engine::EngineError;
-use crate::output::{SharedArray, SpectraArray};
+use crate::output::{LrvLabel, SharedArray, SpectraArray};
+use crate::quantity::Quantity;
+use crate::recipe::Recipe;
 
 /// Rows of a data set, as an engine draws them: draws, or scenes.
 pub trait Rows {
@@ -66,4 +68,13 @@ pub struct Companions {
     pub(crate) first: u64,
     /// Small files that lie beside the chunks of a set, by name.
     pub(crate) files: Vec<(&'static str, String)>,
+}
+
+impl Companions {
+    /// Those of spectra of a recipe's model alone, in rows from `first` on.
+    fn of_recipe(recipe: &Recipe, lrv: LrvLabel, first: u64) -> Companions {
+        let name = Quantity::Spectra.name().to_owned();
+        let spectra = SpectraArray { name, group: None, kind: recipe.model().kind(), lrv };
+        Companions { spectra: vec![spectra], first, files: vec![("_model.json", recipe.model().to_json())] }
+    }
 }

@@ -165,16 +165,7 @@ mod tests {
 
     /// Reflectances that vary in one shape.
     fn varying(offset: Vec<f64>, shape: Vec<f64>) -> Program {
-        Program {
-            kind: SpectrumKind::Reflectance,
-            spectrum: Affine { offset, gain: vec![shape] },
-            target: None,
-            intensity: None,
-            proposal: None,
-            max_attempts: 1,
-            outputs: Vec::new(),
-            given: 0,
-        }
+        Program::of(SpectrumKind::Reflectance, Affine { offset, gain: vec![shape] })
     }
 
     #[test]

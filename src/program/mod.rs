@@ -76,9 +76,14 @@ pub(crate) struct Program {
 impl Program {
     /// Makes a program for physical draws of a model with these weights, without outputs.
     pub(crate) fn new(model: &Model, weights: &Affine) -> Program {
+        Program::of(model.kind(), model.spectrum_map(weights))
+    }
+
+    /// Makes a program for physical draws of spectra of this map, without outputs.
+    pub(crate) fn of(kind: SpectrumKind, spectrum: Affine) -> Program {
         Program {
-            kind: model.kind(),
-            spectrum: model.spectrum_map(weights),
+            kind,
+            spectrum,
             target: None,
             intensity: None,
             proposal: None,

@@ -174,16 +174,7 @@ mod tests {
                 offset: (0..bands).map(|_| 0.5 + 1.2 * uniform()).collect(),
                 gain: (0..m).map(|_| (0..bands).map(|_| uniform()).collect()).collect(),
             };
-            let program = Program {
-                kind: SpectrumKind::Reflectance,
-                spectrum,
-                target: None,
-                intensity: None,
-                proposal: None,
-                max_attempts: 1,
-                outputs: Vec::new(),
-                given: 0,
-            };
+            let program = Program::of(SpectrumKind::Reflectance, spectrum);
             let found = mode(&program);
             let least = |direction: &[f64]| least_product(&program, direction);
             let Some(y) = found else {

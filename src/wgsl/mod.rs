@@ -204,17 +204,7 @@ mod tests {
         };
         let outputs = vec![Output { format: ArrayFormat::spectra(bands), source: Source::Spectrum }];
         let target = target.map(|(lrv, bounds)| program::LrvTarget { lrv, weights, bounds });
-        Program {
-            kind,
-            spectrum,
-            target,
-            intensity: None,
-            proposal: None,
-            max_attempts: 100,
-            outputs,
-            given: 0,
-        }
-        .with_status()
+        Program { target, max_attempts: 100, outputs, ..Program::of(kind, spectrum) }.with_status()
     }
 
     /// Two centres.

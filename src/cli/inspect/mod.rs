@@ -11,30 +11,21 @@ use std::path::PathBuf;
 use serde::Serialize;
 use spectroll::evaluation::comparison::ComparisonFigures;
 use spectroll::wording::{grouped, wrapped};
-use spectroll::{
-    Bounds, CoverSize, Distribution, Grid, Model, Normalization, Recipe, RecipeError, SpectrumKind,
-};
+use spectroll::{Bounds, CoverSize, Distribution, Model, Normalization, Recipe, RecipeError, SpectrumKind};
 
 mod comparison;
 
 use self::comparison::Compared;
-use super::options::RecipeArguments;
+use super::options::{ModelArguments, RecipeArguments};
 use super::parse::number;
 use super::run::left_out;
-use super::wavelengths::grid;
 use super::{if_exists, picture};
 
 /// Show the contents of a model: a table, and a picture where asked
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// The model: a file, or the name of a built-in one
-    #[arg(value_name = "MODEL")]
-    pub(crate) model: String,
-
-    /// The wavelengths of a built-in model, in nm, at which it is fitted: a grid, a list as in 443,490,560, or a file of
-    /// them [default: those of its name]
-    #[arg(long, value_name = "START:STEP:STOP|FILE", value_parser = grid)]
-    wavelengths: Option<Grid>,
+    #[command(flatten)]
+    pub(crate) model: ModelArguments,
 
     /// Draw the model, or its draws beside the data, into this file: .svg, .png or .pdf
     #[arg(short, long, value_name = "PATH")]
@@ -65,7 +56,7 @@ pub(crate) struct Arguments {
 /// Prints the table, after making the picture where one is asked for.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let format = arguments.output.as_deref().map(picture::format).transpose()?;
-    let model = super::model_at(&arguments.model, arguments.wavelengths.as_ref())?;
+    let model = arguments.model.load()?;
     let recipe = arguments.request.settings(&model)?.builder(&model).build();
     let compared = match &recipe {
         Ok(recipe) => arguments.data.compare(recipe, arguments.seed)?,
@@ -73,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Err(_) => None,
     };
     if let (Some(path), Some(format)) = (&arguments.output, format) {
-        let (name, model, theme) = (arguments.model.as_str(), &model, arguments.ground.theme());
+        let (name, model, theme) = (arguments.model.model.as_str(), &model, arguments.ground.theme());
         let drawing = match &compared {
             Some(compared) => {
                 let (note, comparison) = (&compared.note(), &compared.comparison);
@@ -88,10 +79,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let text = match arguments.json {
         true => {
-            serde_json::to_string_pretty(&Facts::of(&arguments.model, &model, &recipe, compared.as_ref()))?
-                + "\n"
+            serde_json::to_string_pretty(&Facts::of(
+                &arguments.model.model,
+                &model,
+                &recipe,
+                compared.as_ref(),
+            ))? + "\n"
         }
-        false => table(&arguments.model, &model, &recipe, compared.as_ref()),
+        false => table(&arguments.model.model, &model, &recipe, compared.as_ref()),
     };
     std::io::stdout().lock().write_all(text.as_bytes())?;
     Ok(())
