@@ -180,6 +180,24 @@ fn a_mean_can_be_replaced() {
 }
 
 #[test]
+fn a_mean_is_the_power_of_a_light() {
+    let build = |mean: &[f64]| {
+        let scene = Scene::builder(1).group(Illuminants::new("sun", &daylight(), 5).mean(mean)).build();
+        scene.map(|_| ()).map_err(|error| error.to_string())
+    };
+    let mut mean = [1.0; 31];
+    mean[10] = 0.0;
+    assert_eq!(build(&mean), Ok(()), "a band may be dark");
+    mean[10] = -1e-9;
+    let refused = build(&mean).expect_err("no light is negative");
+    assert!(refused.contains("at 500 nm is -0.000000001") && refused.contains("raise it to 0"), "{refused}");
+    let refused = build(&[0.0; 31]).expect_err("no light is dark");
+    assert!(refused.contains("mean power is 0"), "{refused}");
+    let refused = build(&[1.0; 30]).expect_err("a band has no value");
+    assert!(refused.contains("30 values where the model has 31 bands"), "{refused}");
+}
+
+#[test]
 fn copies_are_at_their_levels_and_within_bounds() {
     let scene = everything().build().expect("it is possible");
     let all = arrays(&scene, cpu(), 0..1000);
@@ -431,6 +449,21 @@ fn what_is_left_out_is_said() {
     assert_eq!(workload.draws, 1 + 999 + 1000);
     let text = workload.left_out.join("\n");
     assert!(text.contains("background: it is fixed, so it is drawn and stored once"), "{text}");
+    let lights = Illuminants::new("sky", &daylight(), 3).fixed();
+    let brightened = lights.clone().intensity(Intensity::LogUniform(0.5, 2.0), IntensityScope::Light);
+    for (lights, said) in [
+        (lights, "sky: it is fixed, so it is drawn and stored once"),
+        (brightened, "sky: its spectra are fixed, so they are drawn once, on the CPU, and only scaled"),
+    ] {
+        let text = Scene::builder(10)
+            .group(lights)
+            .build()
+            .expect("it is possible")
+            .workload(10)
+            .left_out
+            .join("\n");
+        assert!(text.contains(said), "{text}");
+    }
     let shared = Scene::builder(10)
         .group(Surfaces::new("a", &surfaces(), 3))
         .group(Surfaces::new("b", &surfaces(), 4))
