@@ -94,16 +94,20 @@ pub(super) fn turned(sides: &[usize], values: &[f64]) -> Vec<f64> {
     let mut out = Vec::with_capacity(values.len());
     for _ in 0..values.len() {
         out.push(values[index.iter().zip(&strides).map(|(i, stride)| i * stride).sum::<usize>()]);
-        // The last side runs first.
-        for side in (0..sides.len()).rev() {
-            index[side] += 1;
-            if index[side] < sides[side] {
-                break;
-            }
-            index[side] = 0;
-        }
+        advance(&mut index, sides);
     }
     out
+}
+
+/// Takes an index to the next value of an array with these sides, of which the last runs first; from the last to the first.
+pub(super) fn advance(index: &mut [usize], sides: &[usize]) {
+    for (index, side) in index.iter_mut().zip(sides).rev() {
+        *index += 1;
+        if *index < *side {
+            break;
+        }
+        *index = 0;
+    }
 }
 
 /// The reason of a file that ends too early, or cannot be read on.

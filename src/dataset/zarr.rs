@@ -266,13 +266,7 @@ impl Layout {
                 present += 1;
                 self.read_chunk(&path, &at, &mut values)?;
             }
-            for side in (0..at.len()).rev() {
-                at[side] += 1;
-                if at[side] < grid[side] {
-                    break;
-                }
-                at[side] = 0;
-            }
+            npy::advance(&mut at, &grid);
         }
         // What a missing chunk is filled with is no measurement.
         let missing = chunks.unwrap_or(0) - present;
@@ -375,13 +369,7 @@ impl Layout {
                     values[offset + first..][..kept].copy_from_slice(&part[..kept]);
                 }
             }
-            for side in (0..sides - 1).rev() {
-                index[side] += 1;
-                if index[side] < self.chunk[side] {
-                    break;
-                }
-                index[side] = 0;
-            }
+            npy::advance(&mut index[..sides - 1], &self.chunk[..sides - 1]);
         }
         Ok(())
     }
