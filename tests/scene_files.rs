@@ -52,6 +52,7 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
     write("fine.json", &fine.to_json());
     write("two.csv", "nm,a,b\n380,1,2\n540,1,2\n780,1,2\n");
     write("short.csv", "500,1\n540,2\n600,3\n");
+    write("narrow.csv", "380;1\n390;2\n");
     let dips = (40..=70)
         .map(|ten| format!("{ten}0,{}\n", if ten == 50 { "-0.2" } else { "2.0" }))
         .collect::<String>();
@@ -278,6 +279,52 @@ fn every_mistake_is_named_with_its_line_and_a_remedy() {
             "mean",
             "mean = \"negative.csv\"",
             &["line 8, mean of \"lights\"", "at 500 nm is -", "raise it to 0"],
+        ),
+        (
+            "target",
+            "model",
+            "flat = true\nbounds = \"scaled\"",
+            &[
+                "line 15, bounds of \"target\"",
+                "for a flat target, which is the same in every band",
+                "leave it out",
+            ],
+        ),
+        (
+            "target",
+            "lrv",
+            "xyz = [0.3, 0.3, 0.3]\nbounds = \"scaled\"",
+            &["line 16, bounds of \"target\"", "without an lrv", "tristimulus values is not scaled"],
+        ),
+        (
+            "surface",
+            "observer",
+            "observer = \"cie1964\"",
+            &["line 12, observer of \"background\"", "needs the quantity xyz"],
+        ),
+        (
+            "surface",
+            "illuminant",
+            "illuminant = \"a\"",
+            &["line 12, illuminant of \"background\"", "needs the quantity xyz"],
+        ),
+        (
+            "surface",
+            "sensors",
+            "sensors = \"ss2\"",
+            &["line 12, sensors of \"background\"", "without \"responses\"", "leave it out"],
+        ),
+        (
+            "surface",
+            "response_scale",
+            "response_scale = \"white\"",
+            &["line 12, response_scale of \"background\"", "without \"responses\"", "leave it out"],
+        ),
+        (
+            "surface",
+            "sensors",
+            "sensors = \"narrow.csv\"\nquantities = [\"responses\"]",
+            &["line 12, sensors of \"background\"", "where its table ends", "choose a grid within the table"],
         ),
         ("surface", "name", "name = \"iocxo\"", &["line 9, name of \"iocxo\"", "stream 0", "another name"]),
         ("", "surface", "surface = 3", &["surface", "double brackets"]),
