@@ -229,12 +229,14 @@ pub(crate) fn triangle(rows: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// Candidates by hand, of three centres with three coordinates, in two lanes.
+    /// Candidates by hand, of three centres with three coordinates, in nine lanes.
     #[test]
     fn candidates_are_centres_and_factors_times_normals() {
         let coordinates: Vec<f64> = (0..9).map(|i| f64::from(i) - 4.0).collect();
         let factors: Vec<f64> = (0..18).map(|i| f64::from(i * i % 11) / 8.0).collect();
-        let normals = [[0.5, -1.0], [2.0, 0.25], [-1.5, 3.0]];
+        const LANES: usize = 9;
+        let normals: [[f64; LANES]; 3] =
+            [0.5, 2.0, -1.5].map(|z| std::array::from_fn(|l| z + l as f64 / 4.0));
         for spread in [Spread::Same(0.5), Spread::Own(factors.clone())] {
             let is_same = spread == Spread::Same(0.5);
             let centres = Centres {
@@ -249,10 +251,11 @@ mod tests {
                 (3, 0, if is_same { 1 } else { 3 })
             );
             let mut seen = [false; 3];
-            for words in (0..64u32).map(|i| [i << 26, (i ^ 37) << 26]) {
+            for first in 0..64u32 {
+                let words = std::array::from_fn(|l| (first + 7 * l as u32) << 26);
                 let mut placed = normals;
                 mixture.place(&mut placed, &words);
-                for l in 0..2 {
+                for l in 0..LANES {
                     let centre = mixture.alias.choose(words[l]) as usize;
                     seen[centre] = true;
                     let c = &coordinates[3 * centre..][..3];

@@ -161,6 +161,28 @@ mod tests {
         }
     }
 
+    /// A uniform share of what lies between two ends, both ways of which may be the shorter tail.
+    #[test]
+    fn wide_intervals_are_shared_out_by_the_distribution_function() {
+        let below = |x: f64| 0.5 * libm::erfc(-x / SQRT_2);
+        for ([low, high], shift) in [([-1.5, 0.5], 0.25), ([0.1, 3.0], -2.0), ([-6.0, -1.0], 0.0)] {
+            let axis = [below(-high), below(low), below(high) - below(low), shift];
+            for x in words().step_by(997) {
+                let [exact, cost] = exact_truncated(axis, x);
+                let share = (below(exact - shift) - below(low)) / axis[2];
+                assert!(
+                    (share - exact_uniform(x)).abs() < 1e-13 && cost == 0.0,
+                    "{low} to {high}, {x}: {share}"
+                );
+                let [value, cost] = truncated(axis.map(|v| v as f32), x);
+                assert!(
+                    (f64::from(value) - exact).abs() < 2e-6 && cost == 0.0,
+                    "{low} to {high}, {x}: {value}"
+                );
+            }
+        }
+    }
+
     /// Shares of an interval of any width; the logarithm's relative error is that of a step along a hat.
     #[test]
     fn logarithms_keep_their_digits_near_1() {
