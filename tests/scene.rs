@@ -476,6 +476,7 @@ fn what_is_left_out_is_said() {
         text.contains("b: no shader of its own") && text.contains("illuminants: the scene has none"),
         "{text}"
     );
+    assert!(!text.contains("same shape"), "{text}");
 }
 
 /// The statistics of each preset against a program that shares none of the code. SPECTROLL_PYTHON names a Python that

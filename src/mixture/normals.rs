@@ -159,6 +159,18 @@ mod tests {
         assert_eq!(normals(&data, 2, 2).len(), 2);
     }
 
+    /// Of tight clusters that are far apart each has a seed: a point has none beside it but by a chance of 1e-10.
+    #[test]
+    fn seeds_are_far_from_each_other() {
+        let data: Vec<_> =
+            (0..90).map(|i| DVector::from_element(1, f64::from(i % 3) + 1e-6 * f64::from(i))).collect();
+        for seed in 0..20 {
+            let mut clusters: Vec<_> = seeds(&data, 3, seed).iter().map(|point| point[0].floor()).collect();
+            clusters.sort_by(f64::total_cmp);
+            assert_eq!(clusters, [0.0, 1.0, 2.0]);
+        }
+    }
+
     /// As many as there are data, and repeated data: variances keep their floor, and shares sum to 1.
     #[test]
     fn few_and_repeated_data_have_distributions() {

@@ -405,3 +405,26 @@ fn check(plan: &GroupPlan, places: u32, first: u64, statuses: &[DrawStatus]) -> 
     let (group, attempts) = (plan.name.clone(), plan.max_attempts);
     Err(EngineError::ExhaustedInScene { group, scene: first + scene, element, attempts })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use crate::scene::Surfaces;
+
+    #[test]
+    fn a_failed_draw_is_named_by_its_scene() {
+        let model = Model::builtin("munsell-vrhel").expect("it is built in");
+        let scene =
+            Scene::builder(10).group(Surfaces::new("wall", &model, 3)).build().expect("it is possible");
+        let mut statuses = [DrawStatus::accepted(1, false); 12];
+        assert_eq!(check(&scene.plans[0], 3, 5, &statuses).map_err(|error| error.to_string()), Ok(()));
+        statuses[7..].fill(DrawStatus::FAILED);
+        match check(&scene.plans[0], 3, 5, &statuses) {
+            Err(EngineError::ExhaustedInScene { group, scene, element, .. }) => {
+                assert_eq!((group.as_str(), scene, element), ("wall", 7, 1));
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}

@@ -364,7 +364,7 @@ mod tests {
             "{error}"
         );
         assert!(camera().on_grid(&grid("380:10:700")).is_ok());
-        let flat = Sensors::new("s", ["a"], &[400.0, 500.0], &[vec![1.0; 2]]).unwrap();
+        let flat = Sensors::new("s", ["a"], &[400.0, 500.0], &[vec![2.0; 2]]).unwrap();
         assert!(flat.on_grid(&grid("410:10:490")).is_ok());
         for (text, end) in [("390:10:490", "at 400 nm"), ("410:10:510", "at 500 nm")] {
             let error = refused(&flat, text);
