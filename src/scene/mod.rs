@@ -37,6 +37,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod array;
 mod error;
 mod file;
 mod group;
@@ -52,14 +53,15 @@ use crate::grid::Grid;
 use crate::model::Model;
 use crate::random::stream::Stream;
 
+pub use array::Array;
 use error::{Fault, MAX_COUNT, MAX_DRAWS};
 pub use error::{SceneError, SceneErrorKind, SceneErrorPlace};
 pub use file::{MAX_FILE_BYTES, PRESETS};
 pub use group::{
     Copies, Group, Hue, Illuminants, IntensityScope, LrvLevels, Surfaces, TargetConstraint, Targets,
 };
+pub use plan::GroupKind;
 use plan::GroupPlan;
-pub use plan::{Array, GroupKind};
 pub use sampler::{PreparedScene, SceneSampler};
 pub use session::{GroupSummary, SceneSession, Window};
 pub use workload::{GroupWorkload, Workload};

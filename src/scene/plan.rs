@@ -6,16 +6,14 @@ use crate::colorimetry;
 use crate::dataset::SpectrumKind;
 use crate::grid::Grid;
 use crate::model::{Model, ModelParts};
-use crate::program::{Bounds, IntensityLaw};
-use crate::quantity::{Dtype, Quantity, ValueRange};
+use crate::program::IntensityLaw;
+use crate::quantity::Quantity;
 use crate::random::stream::{self, Stream};
 use crate::recipe::{Intensity, OutputRequest, Recipe, RecipeBuilder, RecipeError};
-use crate::sensors::Sensors;
 
+use super::array::{Array, Intensities, arrays};
 use super::error::{Fault, SceneErrorKind};
-use super::group::{
-    Base, Group, Illuminants, IntensityScope, QUANTITIES, TargetConstraint, Targets, Viewing,
-};
+use super::group::{Base, Group, Illuminants, IntensityScope, QUANTITIES, Viewing};
 use super::lighting::Lighting;
 use super::target::{TargetPlan, key};
 
@@ -115,61 +113,6 @@ pub(super) struct Drawing {
 pub(super) struct Varying {
     law: IntensityLaw<f32>,
     pub(super) scope: IntensityScope,
-}
-
-/// An array that a scene gives.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Array {
-    /// Its name: that of its group, with an underscore and the name of the quantity unless that is spectra.
-    pub name: String,
-    /// The group that it belongs to.
-    #[serde(skip)]
-    pub group: String,
-    /// The kind of its group.
-    #[serde(skip)]
-    pub kind: GroupKind,
-    /// The quantity that it holds: f32, or u32 where it counts attempts.
-    pub quantity: Quantity,
-    /// Whether it has an entry for each scene, rather than one for all.
-    pub per_scene: bool,
-    /// The extents of an entry. Spectra have (count, bands), and other quantities one of them or none; what is seen under
-    /// the lights of the scene has the number of lights before these.
-    pub shape: Vec<usize>,
-    /// The group of lights that it is seen under.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub under: Option<String>,
-    /// Names of the values along the last axis, where each has one of its own.
-    #[serde(skip)]
-    pub channels: Vec<String>,
-    /// Range of its values, if they are spectra.
-    #[serde(skip)]
-    pub range: Option<ValueRange>,
-}
-
-/// The name of a group's array: that of the group, with an underscore and the name of the quantity unless that is
-/// spectra.
-fn array_name(group: &str, quantity: Quantity) -> String {
-    match quantity {
-        Quantity::Spectra => group.to_owned(),
-        quantity => format!("{group}_{quantity}"),
-    }
-}
-
-impl Array {
-    /// Number of values of an entry.
-    pub fn values(&self) -> usize {
-        self.shape.iter().product()
-    }
-
-    /// The type of its values.
-    pub fn dtype(&self) -> Dtype {
-        if self.quantity == Quantity::Attempts { Dtype::U32 } else { Dtype::F32 }
-    }
-
-    /// Number of bytes of an entry: every value has 4.
-    pub fn bytes(&self) -> usize {
-        4 * self.values()
-    }
 }
 
 impl Varying {
@@ -441,99 +384,4 @@ fn with_mean(model: &Model, mean: &[f64]) -> Result<Model, SceneErrorKind> {
     let mut new = parts.mean.clone();
     new.iter_mut().zip(mean).zip(&old).for_each(|((new, mean), old)| *new += scale * mean - old);
     Model::new(ModelParts { mean: new, ..parts.clone() }).map_err(SceneErrorKind::Model)
-}
-
-/// Whether an intensity multiplies a quantity of lights.
-pub(super) fn is_multiplied(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Spectra | Quantity::Xyz | Quantity::LinearSrgb | Quantity::Responses)
-}
-
-/// Intensities of a group.
-#[derive(Clone, Copy, PartialEq)]
-enum Intensities {
-    None,
-    /// One number for all lights of all scenes.
-    Fixed,
-    Varying(IntensityScope),
-}
-
-fn arrays(
-    group: &Group,
-    shapes: &Shapes,
-    (intensities, lights): (Intensities, Option<&Base>),
-    bands: usize,
-) -> Vec<Array> {
-    let base = group.base();
-    let count = base.count as usize;
-    let once = matches!(shapes, Shapes::Once(_));
-    let kind = match group {
-        Group::Illuminants(_) => GroupKind::Illuminant,
-        Group::Surfaces(_) => GroupKind::Surface,
-        Group::Targets(_) => GroupKind::Target,
-    };
-    let range = match group {
-        Group::Illuminants(_) => ValueRange::Positive,
-        Group::Surfaces(_) => ValueRange::Unit,
-        Group::Targets(Targets { aim: TargetConstraint::Lrv(_), bounds: Bounds::Base, .. }) => {
-            ValueRange::Positive
-        }
-        Group::Targets(_) => ValueRange::Unit,
-    };
-    let array = |quantity: Quantity, per_scene, shape: &[usize]| Array {
-        name: array_name(&base.name, quantity),
-        group: base.name.clone(),
-        kind,
-        quantity,
-        per_scene,
-        shape: shape.to_vec(),
-        under: None,
-        channels: quantity.channels().iter().map(|&name| name.to_owned()).collect(),
-        range: (quantity == Quantity::Spectra).then_some(range),
-    };
-    let mut arrays = Vec::new();
-    let varies = matches!(intensities, Intensities::Varying(_));
-    if base.wants(Quantity::Spectra) {
-        arrays.push(array(Quantity::Spectra, !once || varies, &[count, bands]));
-    }
-    match intensities {
-        Intensities::Varying(IntensityScope::Scene) => arrays.push(array(Quantity::Intensity, true, &[])),
-        Intensities::Varying(IntensityScope::Light) => {
-            arrays.push(array(Quantity::Intensity, true, &[count]));
-        }
-        Intensities::Fixed => arrays.push(array(Quantity::Intensity, false, &[count])),
-        Intensities::None => {}
-    }
-    let mut flat = false;
-    if let Group::Targets(Targets { aim, .. }) = group {
-        arrays.push(array(Quantity::Lrv, true, &[count]));
-        if let TargetConstraint::Hue(_) = aim {
-            arrays.push(array(Quantity::Xyz, true, &[count, 3]));
-        }
-        flat = matches!(aim, TargetConstraint::Flat(_));
-    }
-    for &quantity in Quantity::COLOURS {
-        // The given tristimulus values of a hue are among them already.
-        if base.wants(quantity) && arrays.iter().all(|array| array.quantity != quantity) {
-            let scales = varies && is_multiplied(quantity);
-            arrays.push(array(quantity, !once || scales, &[count, quantity.channels().len()]));
-        }
-    }
-    let channels: Vec<String> = base.viewing.sensors.iter().flat_map(Sensors::channels).cloned().collect();
-    if base.wants(Quantity::Responses) {
-        let per_scene = lights.is_some() || !once || varies;
-        let shape: Vec<usize> =
-            lights.iter().map(|lights| lights.count as usize).chain([count, channels.len()]).collect();
-        let under = lights.map(|lights| lights.name.clone());
-        arrays.push(Array { under, channels, ..array(Quantity::Responses, per_scene, &shape) });
-    }
-    if let Some(lights) = lights.filter(|_| base.wants(Quantity::ColorSignal)) {
-        let under = Some(lights.name.clone());
-        let range = Some(ValueRange::Positive);
-        let shape = [lights.count as usize, count, bands];
-        arrays.push(Array { under, range, ..array(Quantity::ColorSignal, true, &shape) });
-    }
-    if !flat {
-        arrays.push(array(Quantity::Attempts, !once, &[count]));
-    }
-    arrays
 }

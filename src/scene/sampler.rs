@@ -13,8 +13,9 @@ use crate::threads;
 use crate::wgsl::{Arithmetic, WORKGROUP};
 
 use super::Scene;
+use super::array::Array;
 use super::group::IntensityScope;
-use super::plan::{Array, Drawing, GroupPlan};
+use super::plan::{Drawing, GroupPlan};
 use super::session::{SharedSpectra, columns};
 
 const COPIES: &str = include_str!("../../shaders/scene_copies.wgsl");

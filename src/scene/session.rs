@@ -15,8 +15,9 @@ use crate::quantity::Quantity;
 use crate::random::stream::{DrawRange, Draws};
 
 use super::Scene;
+use super::array::{Array, is_multiplied};
 use super::group::IntensityScope;
-use super::plan::{Array, Drawing, GroupPlan, Shapes, is_multiplied};
+use super::plan::{Drawing, GroupPlan, Shapes};
 
 /// Approximate size of a window in bytes, where no engine draws it.
 const WINDOW_BYTES: u64 = 8 << 20;

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::Scene;
-use super::plan::{Array, GroupKind, GroupPlan, Shapes};
+use super::array::Array;
+use super::plan::{GroupKind, GroupPlan, Shapes};
 use super::target::TargetPlan;
 use crate::quantity::Quantity;
 
