@@ -71,7 +71,7 @@ pub struct Companions {
 }
 
 impl Companions {
-    /// Those of spectra of a recipe's model alone, in rows from `first` on.
+    /// Makes those of rows of a recipe's spectra, from `first` on.
     fn of_recipe(recipe: &Recipe, lrv: LrvLabel, first: u64) -> Companions {
         let name = Quantity::Spectra.name().to_owned();
         let spectra = SpectraArray { name, group: None, kind: recipe.model().kind(), lrv };

@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(bandwidth(&[0.5; 8], [1, 1], &[]), bandwidth(&[0.5; 9], [1, 1], &[]));
     }
 
-    /// What NumPy makes of the formula above: of both components, of the first alone, and of a narrow spread, where all but
+    /// The formula above, as NumPy has it: of both components, of the first alone, and of a narrow spread, where all but
     /// the nearest term are nothing.
     #[test]
     fn the_likelihood_is_that_of_the_formula() {

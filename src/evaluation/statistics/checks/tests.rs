@@ -187,7 +187,7 @@ fn smallest_errors_are_those_of_the_formulas() {
     assert_eq!(smallest_errors(&one).acceptance, 0.0);
 }
 
-/// What its description says: properties that no fit gives.
+/// The properties that its description promises, and no fit gives.
 #[test]
 fn the_tinted_model_is_tinted() {
     let model = tinted();
