@@ -8,6 +8,7 @@ mod program;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -57,6 +58,48 @@ fn two_hundred_crowds() {
     rounds(18..218);
 }
 
+/// Readers of what others replace all the time find one set or the other, whole: never parts of both, and never nothing.
+#[test]
+fn who_reads_while_others_replace_finds_no_damage() {
+    const REPLACEMENTS: u32 = 60;
+    let folder = tempfile::tempdir().unwrap();
+    let set = |seed: u32, end: &str| {
+        format!(
+            "sample munsell-vrhel -n 20000 --engine cpu -t 1 -q --seed {seed} -o x.zarr --chunk 500 {end}"
+        )
+    };
+    let file = |seed: u32, end: &str| {
+        format!("sample munsell-vrhel -n 20000 --engine cpu -t 1 -q --seed {seed} -o y.npy --sidecar {end}")
+    };
+    for words in [set(1, ""), file(1, "")] {
+        succeeds(folder.path(), &words);
+    }
+    let running = Arc::new(());
+    let readable = Arc::downgrade(&running);
+    let replace = |words: &dyn Fn(u32, &str) -> String, _running: Arc<()>| {
+        (0..REPLACEMENTS).for_each(|i| _ = succeeds(folder.path(), &words(1 + i % 2, "--force")));
+    };
+    let read = |words: &str, may_be: &[i32]| {
+        let mut reads = 0;
+        while readable.strong_count() > 0 {
+            let output = spectroll(folder.path(), words);
+            assert!(output.status.code().is_some_and(|code| may_be.contains(&code)), "{words}: {output:?}");
+            reads += 1;
+        }
+        println!("{words}: {reads} times");
+        assert!(reads > 0);
+    };
+    std::thread::scope(|scope| {
+        let again = Arc::clone(&running);
+        scope.spawn(|| replace(&set, again));
+        scope.spawn(|| replace(&file, running));
+        scope.spawn(|| read("verify x.zarr -q", &[0]));
+        scope.spawn(|| read("verify y.npy -q", &[0]));
+        // Who resumes one of the two may find the other, which is an error of its own.
+        scope.spawn(|| read(&set(1, "--resume"), &[0, 1]));
+    });
+}
+
 fn rounds(rounds: std::ops::Range<u32>) {
     let mut ends = BTreeMap::new();
     for round in rounds {
@@ -73,6 +116,8 @@ fn rounds(rounds: std::ops::Range<u32>) {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum End {
     Whole,
+    /// A file without its sidecar.
+    Alone,
     Unfinished,
     Nothing,
 }
@@ -150,7 +195,16 @@ fn check(folder: &Path, output: &str, account: &str, succeeded: bool, may_be_not
         let own = |(path, _): &(String, Vec<u8>)| !path.contains(".partial");
         tree(folder).into_iter().filter(own).collect::<Vec<_>>()
     };
-    let end = if folder.join(name).exists() {
+    let without_sidecar = |tree: &Vec<(String, Vec<u8>)>| {
+        let own = tree.iter().filter(|(path, _)| path == name);
+        own.cloned().collect::<Vec<_>>()
+    };
+    let end = if folder.join(name).is_file() && !expected.contains(&found(folder)) {
+        // A file appears before its sidecar. Who was killed in between left the file alone, and whole.
+        let alone = expected.each_ref().map(without_sidecar);
+        assert!(may_be_nothing && alone.contains(&found(folder)), "{account}");
+        End::Alone
+    } else if folder.join(name).exists() {
         assert!(expected.contains(&found(folder)), "{account}");
         if is_verified {
             succeeds(folder, &format!("verify {name} --engine cpu --redraw 1"));

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use program::{PROGRAM, fails, files, signed, spectroll, succeeds, tree, wait_until};
 use rand::RngExt;
 use spectroll::Stream;
+use spectroll::output::SetAudit;
 
 const LAYOUTS: [&str; 3] = ["a.zarr", "a/ --format npy", "a/ --format parquet"];
 
@@ -380,4 +381,24 @@ fn of_two_runs_that_start_at_once_one_is_refused() {
         assert_eq!(succeeded, 1, "round {round}: {first:?} {second:?}");
         succeeds(folder.path(), "verify x.zarr --engine cpu");
     }
+}
+
+/// A set that is replaced by the same bytes while it is read is another: what was missed on the way is no damage.
+#[test]
+fn a_set_that_replaces_another_is_told_from_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = "sample munsell-vrhel -n 1000 --engine cpu -q -o x.zarr --chunk 100";
+    succeeds(folder.path(), run);
+    let path = folder.path().join("x.zarr");
+    let audit = SetAudit::open(&path).unwrap();
+    assert_eq!(audit.moved(), None);
+    succeeds(folder.path(), &format!("{run} --force"));
+    assert_eq!(audit.moved(), Some(path.clone()));
+    let again = SetAudit::open(&path).unwrap();
+    assert_eq!((again.moved(), again.faults().len()), (None, 0));
+    // Between two names.
+    std::fs::rename(&path, folder.path().join("x.zarr.replaced.partial")).unwrap();
+    assert!(SetAudit::is_being_replaced(&path) && again.moved() == Some(path.clone()));
+    std::fs::rename(folder.path().join("x.zarr.replaced.partial"), &path).unwrap();
+    assert!(!SetAudit::is_being_replaced(&path) && again.moved().is_none());
 }

@@ -3,7 +3,7 @@
 //! Some formats have attributes and others have none, and no format can hold the sum of its own file. So this is
 //! a file of its own, for those who ask for it.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -87,6 +87,23 @@ impl Sidecar {
         Ok(sidecar)
     }
 
+    /// Reads the sidecar of a file, and describes how the file differs from what was written, if it does: both as they are
+    /// at one moment, whoever writes that name meanwhile.
+    pub fn check(file: &Path) -> Result<(Sidecar, Option<String>), OutputError> {
+        let alone = lock_folder(folder(file));
+        let sidecar = Sidecar::load(file)?;
+        let Some(sum) = sidecar.sum_of(file) else {
+            return Ok((sidecar, Some("the sidecar has no sum".to_owned())));
+        };
+        if let Some(fault) = sum.size_fault(folder(file)) {
+            return Ok((sidecar, Some(fault)));
+        }
+        let opened = File::open(file);
+        drop(alone); // what is open stays as it is
+        let fault = sum.fault_of(opened);
+        Ok((sidecar, fault))
+    }
+
     /// Makes a file appear under its name, and its sidecar beside it, if it has one; that of a file before it goes. There is
     /// no moment at which the sidecar is that of another file, whoever else writes the same name: the folder is locked
     /// meanwhile, where folders can be.
@@ -127,9 +144,17 @@ impl Sidecar {
 
     /// Describes how a file differs from what was written, if it does. It may have another name.
     pub fn fault(&self, file: &Path) -> Option<String> {
-        let Some(sum) = &self.file else { return Some("the sidecar has no sum".to_owned()) };
-        let name = file.file_name()?.to_str().unwrap_or(&sum.name).to_owned();
-        Sum { name, ..sum.clone() }.fault(folder(file))
+        match self.sum_of(file) {
+            Some(sum) => sum.fault(folder(file)),
+            None => Some("the sidecar has no sum".to_owned()),
+        }
+    }
+
+    /// The sum of the file, under the name that it has.
+    fn sum_of(&self, file: &Path) -> Option<Sum> {
+        let sum = self.file.as_ref()?;
+        let name = file.file_name().and_then(|name| name.to_str()).unwrap_or(&sum.name).to_owned();
+        Some(Sum { name, ..sum.clone() })
     }
 
     /// Format of the file.

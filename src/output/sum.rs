@@ -34,7 +34,12 @@ impl Sum {
         if let Some(fault) = self.size_fault(root) {
             return Some(fault);
         }
-        match hash(&root.join(&self.name), self.bytes) {
+        self.fault_of(File::open(root.join(&self.name)))
+    }
+
+    /// Describes how an open file differs from what was written, if it does; its size is right.
+    pub(super) fn fault_of(&self, file: io::Result<File>) -> Option<String> {
+        match file.and_then(|file| hash(file, self.bytes)) {
             Ok(sum) if sum == self.blake3 => None,
             Ok(_) => Some(format!("{} does not match its BLAKE3 sum", self.name)),
             Err(e) => Some(format!("{} cannot be read: {e}", self.name)),
@@ -58,13 +63,13 @@ impl Sum {
     /// Sum of a file as it is, under another name.
     pub(super) fn of_file(name: &str, path: &Path) -> io::Result<Sum> {
         let bytes = fs::metadata(path)?.len();
-        Ok(Sum { name: name.to_owned(), bytes, blake3: hash(path, bytes)? })
+        Ok(Sum { name: name.to_owned(), bytes, blake3: hash(File::open(path)?, bytes)? })
     }
 }
 
 /// BLAKE3 sum of a file, of no more than a number of bytes.
-fn hash(path: &Path, bytes: u64) -> io::Result<String> {
-    let mut file = File::open(path)?.take(bytes);
+fn hash(file: File, bytes: u64) -> io::Result<String> {
+    let mut file = file.take(bytes);
     let (mut hasher, mut buffer) = (blake3::Hasher::new(), vec![0; BUFFER.min(bytes as usize + 1)]);
     loop {
         match file.read(&mut buffer) {

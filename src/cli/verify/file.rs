@@ -15,8 +15,7 @@ use crate::cli::{folder, interrupt, run as runs};
 /// Checks the file, draws it again where that was asked for, and puts what is drawn in the place of a damaged one.
 pub(super) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
     let path = &arguments.path;
-    let sidecar = Sidecar::load(path)?;
-    let fault = sidecar.fault(path);
+    let (sidecar, fault) = Sidecar::check(path)?;
     if let (Some(fault), false) = (&fault, arguments.repair) {
         let text = format!("{path:?} is damaged: {fault}; pass --repair to make it again");
         return Err(Unverified(text).into());

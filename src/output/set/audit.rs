@@ -9,13 +9,16 @@ use super::super::pending::{place, sync_folder};
 use super::super::schema::SharedArray;
 use super::super::sum::Sum;
 use super::layout::Part;
-use super::manifest::{Manifest, SEALED, SetPlan};
+use super::manifest::{Manifest, SEALED, Seal, SetPlan};
+use super::occupy::replaced;
 
 /// A set that is being checked, complete or not.
 pub struct SetAudit {
     root: PathBuf,
     manifest: Manifest,
     is_complete: bool,
+    /// The set that was opened, where it is complete.
+    seal: Option<Seal>,
 }
 
 /// Piece of a set that can be made again.
@@ -55,11 +58,17 @@ impl SetAudit {
             return Err(not_a_set());
         }
         let is_complete = path.extension().is_none_or(|extension| extension != "partial");
+        let seal = Manifest::seal(path);
         let manifest = match is_complete {
             true => Manifest::sealed(path)?,
             false => Manifest::joined(path)?.ok_or_else(not_a_set)?,
         };
-        Ok(SetAudit { root: path.to_owned(), manifest, is_complete })
+        Ok(SetAudit { root: path.to_owned(), manifest, is_complete, seal })
+    }
+
+    /// Whether there is no set under a name because another process is just replacing it.
+    pub fn is_being_replaced(path: &Path) -> bool {
+        !path.exists() && replaced(path).exists()
     }
 
     /// Whether the set has its name, and so has to be complete.
@@ -71,8 +80,7 @@ impl SetAudit {
     /// meanwhile.
     pub fn moved(&self) -> Option<PathBuf> {
         if self.is_complete {
-            let now = Manifest::sealed(&self.root);
-            return now.is_ok_and(|now| now.text() != self.manifest.text()).then(|| self.root.clone());
+            return (Manifest::seal(&self.root) != self.seal).then(|| self.root.clone());
         }
         let sealed = self.root.with_extension("");
         (!self.root.exists() && sealed.join(SEALED).exists()).then_some(sealed)

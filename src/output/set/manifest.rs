@@ -7,7 +7,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::ops::Range;
+#[cfg(unix)]
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -25,6 +28,13 @@ pub(super) const SEALED: &str = "_manifest.json";
 
 /// Version of the manifest that this program writes and reads.
 const VERSION: u32 = 2;
+
+/// Identity of a complete set. One that replaces it has another, be its bytes the same.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Seal {
+    file: (u64, u64),
+    modified: Option<SystemTime>,
+}
 
 /// Plan of a set: everything that its bytes depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -175,6 +185,16 @@ impl Manifest {
     /// Reads the manifest of a whole set.
     pub(super) fn sealed(root: &Path) -> Result<Manifest, OutputError> {
         read(&root.join(SEALED))?.ok_or_else(|| OutputError::NotASet { path: root.to_owned() })
+    }
+
+    /// Identity of the complete set in a folder; `None` where none is.
+    pub(super) fn seal(root: &Path) -> Option<Seal> {
+        let found = fs::metadata(root.join(SEALED)).ok()?;
+        #[cfg(unix)]
+        let file = (found.dev(), found.ino());
+        #[cfg(not(unix))]
+        let file = (0, 0);
+        Some(Seal { file, modified: found.modified().ok() })
     }
 
     /// Joins the manifests of a set that is not sealed; `None` where there are none.

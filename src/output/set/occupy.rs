@@ -51,8 +51,18 @@ pub(super) fn occupy(
 ) -> Result<Option<Begun>, OutputError> {
     let begun = Instant::now();
     loop {
-        if is_done(path, plan, start)? {
-            return Ok(None);
+        let seal = Manifest::seal(path);
+        match is_done(path, plan, start) {
+            // Another process replaced the set while it was read.
+            Err(_) if Manifest::seal(path) != seal && begun.elapsed() < PATIENCE => {
+                std::thread::sleep(PAUSE);
+                continue;
+            }
+            done => {
+                if done? {
+                    return Ok(None);
+                }
+            }
         }
         if let Some(begun) = begin(path, shard, start)? {
             return Ok(Some(begun));
