@@ -8,7 +8,6 @@ COUNT leaves the spectra there.
 """
 
 import argparse
-import importlib
 import json
 import signal
 import sys
@@ -202,7 +201,10 @@ asked = arguments()
 try:
     import numpy as np
 
-    globals()[asked.peer] = importlib.import_module(asked.peer)
+    if asked.peer == "numba":
+        import numba
+    if asked.peer == "torch":
+        import torch
 except ImportError as error:
     if asked.count is not None:
         sys.exit(str(error))

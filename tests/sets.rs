@@ -396,9 +396,15 @@ fn a_set_that_replaces_another_is_told_from_it() {
     assert_eq!(audit.moved(), Some(path.clone()));
     let again = SetAudit::open(&path).unwrap();
     assert_eq!((again.moved(), again.faults().len()), (None, 0));
-    // Between two names.
-    std::fs::rename(&path, folder.path().join("x.zarr.replaced.partial")).unwrap();
-    assert!(SetAudit::is_being_replaced(&path) && again.moved() == Some(path.clone()));
-    std::fs::rename(folder.path().join("x.zarr.replaced.partial"), &path).unwrap();
-    assert!(!SetAudit::is_being_replaced(&path) && again.moved().is_none());
+    // Between two names, where whoever opens it waits.
+    let replaced = folder.path().join("x.zarr.replaced.partial");
+    fs::rename(&path, &replaced).unwrap();
+    assert_eq!(again.moved(), Some(path.clone()));
+    std::thread::scope(|scope| {
+        let opened = scope.spawn(|| SetAudit::open(&path).is_ok());
+        std::thread::sleep(Duration::from_millis(100));
+        fs::rename(&replaced, &path).unwrap();
+        assert!(opened.join().unwrap());
+    });
+    assert!(again.moved().is_none());
 }

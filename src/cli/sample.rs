@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let draws = DrawRange { stream, first: arguments.start, count: arguments.count };
     // A folder on this machine is nobody else's business.
-    let name = Path::new(&arguments.model.model).file_name().unwrap_or_default().to_string_lossy();
+    let name = Path::new(&arguments.model.name).file_name().unwrap_or_default().to_string_lossy();
     let export = DrawExport::new(&recipe, draws).model_name(&name).stream_name(arguments.stream.as_deref());
     let schema = export.schema(&output);
     let companions = export.companions();
@@ -132,7 +132,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &output,
         (&recipe, outcome),
         &Report {
-            model: arguments.model.model.clone(),
+            model: arguments.model.name.clone(),
             output: arguments.output.output.display().to_string(),
             files,
             bands: model.bands(),

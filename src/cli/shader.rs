@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         true => format!("#define_import_path spectroll::{}\n\n", arguments.prefix),
         false => String::new(),
     };
-    let (name, kind, version) = (&arguments.model.model, model.kind(), env!("CARGO_PKG_VERSION"));
+    let (name, kind, version) = (&arguments.model.name, model.kind(), env!("CARGO_PKG_VERSION"));
     let text = format!("{import}// {name} ({kind}): spectroll {version}\n{text}");
     match &arguments.output {
         Some(path) => write_file(path, if_exists(arguments.force), text.as_bytes())?,

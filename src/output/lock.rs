@@ -5,6 +5,8 @@
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
+#[cfg(unix)]
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// Outcome of an attempt to lock.
@@ -132,16 +134,18 @@ fn attempt(lock: impl Fn() -> Result<(), TryLockError>) -> Attempt {
     }
 }
 
-#[cfg(unix)]
 fn is_named(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let identity = |found: fs::Metadata| (found.dev(), found.ino());
-    file.metadata().map(identity).ok() == fs::symlink_metadata(path).map(identity).ok()
+    let Ok(named) = fs::symlink_metadata(path) else { return false };
+    file.metadata().is_ok_and(|found| identity(&found) == identity(&named))
 }
 
-#[cfg(not(unix))]
-fn is_named(_: &File, path: &Path) -> bool {
-    path.exists()
+/// Numbers that no other file has which is there at the same time; the same for all where the system has none.
+pub(super) fn identity(found: &fs::Metadata) -> (u64, u64) {
+    #[cfg(unix)]
+    let numbers = (found.dev(), found.ino());
+    #[cfg(not(unix))]
+    let numbers = (0, 0);
+    numbers
 }
 
 #[cfg(test)]

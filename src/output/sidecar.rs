@@ -3,7 +3,7 @@
 //! Some formats have attributes and others have none, and no format can hold the sum of its own file. So this is
 //! a file of its own, for those who ask for it.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -92,15 +92,9 @@ impl Sidecar {
     pub fn check(file: &Path) -> Result<(Sidecar, Option<String>), OutputError> {
         let alone = lock_folder(folder(file));
         let sidecar = Sidecar::load(file)?;
-        let Some(sum) = sidecar.sum_of(file) else {
-            return Ok((sidecar, Some("the sidecar has no sum".to_owned())));
-        };
-        if let Some(fault) = sum.size_fault(folder(file)) {
-            return Ok((sidecar, Some(fault)));
-        }
-        let opened = File::open(file);
+        let opened = sidecar.sum_of(file).and_then(|sum| Ok((sum.open(folder(file))?, sum)));
         drop(alone); // what is open stays as it is
-        let fault = sum.fault_of(opened);
+        let fault = opened.map_or_else(Some, |(file, sum)| sum.fault_of(file));
         Ok((sidecar, fault))
     }
 
@@ -144,17 +138,14 @@ impl Sidecar {
 
     /// Describes how a file differs from what was written, if it does. It may have another name.
     pub fn fault(&self, file: &Path) -> Option<String> {
-        match self.sum_of(file) {
-            Some(sum) => sum.fault(folder(file)),
-            None => Some("the sidecar has no sum".to_owned()),
-        }
+        self.sum_of(file).map_or_else(Some, |sum| sum.fault(folder(file)))
     }
 
-    /// The sum of the file, under the name that it has.
-    fn sum_of(&self, file: &Path) -> Option<Sum> {
-        let sum = self.file.as_ref()?;
+    /// The sum of the file, under the name that it has; else what is wrong.
+    fn sum_of(&self, file: &Path) -> Result<Sum, String> {
+        let sum = self.file.as_ref().ok_or("the sidecar has no sum")?;
         let name = file.file_name().and_then(|name| name.to_str()).unwrap_or(&sum.name).to_owned();
-        Some(Sum { name, ..sum.clone() })
+        Ok(Sum { name, ..sum.clone() })
     }
 
     /// Format of the file.

@@ -31,19 +31,28 @@ impl Sum {
 
     /// Describes how the file in a set differs from what was written, if it does.
     pub(super) fn fault(&self, root: &Path) -> Option<String> {
-        if let Some(fault) = self.size_fault(root) {
-            return Some(fault);
-        }
-        self.fault_of(File::open(root.join(&self.name)))
+        self.open(root).map_or_else(Some, |file| self.fault_of(file))
     }
 
-    /// Describes how an open file differs from what was written, if it does; its size is right.
-    pub(super) fn fault_of(&self, file: io::Result<File>) -> Option<String> {
-        match file.and_then(|file| hash(file, self.bytes)) {
+    /// Opens the file in a set, if it has its size; else describes what is wrong.
+    pub(super) fn open(&self, root: &Path) -> Result<File, String> {
+        match self.size_fault(root) {
+            Some(fault) => Err(fault),
+            None => File::open(root.join(&self.name)).map_err(|e| self.unreadable(&e)),
+        }
+    }
+
+    /// Describes how an open file of the right size differs from what was written, if it does.
+    pub(super) fn fault_of(&self, file: File) -> Option<String> {
+        match hash(file, self.bytes) {
             Ok(sum) if sum == self.blake3 => None,
             Ok(_) => Some(format!("{} does not match its BLAKE3 sum", self.name)),
-            Err(e) => Some(format!("{} cannot be read: {e}", self.name)),
+            Err(e) => Some(self.unreadable(&e)),
         }
+    }
+
+    fn unreadable(&self, error: &io::Error) -> String {
+        format!("{} cannot be read: {error}", self.name)
     }
 
     /// Describes how the file's size differs from what was written, or whether it is missing. Reads no file, and so
@@ -56,7 +65,7 @@ impl Sum {
             }
             Ok(_) => None,
             Err(e) if e.kind() == io::ErrorKind::NotFound => Some(format!("{} is missing", self.name)),
-            Err(e) => Some(format!("{} cannot be read: {e}", self.name)),
+            Err(e) => Some(self.unreadable(&e)),
         }
     }
 

@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Err(_) => None,
     };
     if let (Some(path), Some(format)) = (&arguments.output, format) {
-        let (name, model, theme) = (arguments.model.model.as_str(), &model, arguments.ground.theme());
+        let (name, model, theme) = (arguments.model.name.as_str(), &model, arguments.ground.theme());
         let drawing = match &compared {
             Some(compared) => {
                 let (note, comparison) = (&compared.note(), &compared.comparison);
@@ -80,13 +80,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let text = match arguments.json {
         true => {
             serde_json::to_string_pretty(&Facts::of(
-                &arguments.model.model,
+                &arguments.model.name,
                 &model,
                 &recipe,
                 compared.as_ref(),
             ))? + "\n"
         }
-        false => table(&arguments.model.model, &model, &recipe, compared.as_ref()),
+        false => table(&arguments.model.name, &model, &recipe, compared.as_ref()),
     };
     std::io::stdout().lock().write_all(text.as_bytes())?;
     Ok(())

@@ -5,7 +5,7 @@ mod sources;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use rand::Rng;
 use spectroll::Stream;
@@ -60,22 +60,15 @@ pub(crate) fn join(arguments: &MergeArguments) -> anyhow::Result<()> {
 /// Number of times that a set is looked at again because another process completed or replaced it.
 const LOOKS: usize = 10;
 
-/// Time until the next look at a name that stands for no set for a moment.
-const PAUSE: Duration = Duration::from_millis(20);
-
 pub(crate) fn run(arguments: &VerifyArguments) -> anyhow::Result<()> {
     interrupt::watch();
     if arguments.path.is_file() || Sidecar::path(&arguments.path).is_file() {
         return file::run(arguments);
     }
     let mut path = arguments.path.clone();
-    for look in 1..LOOKS {
+    for _ in 1..LOOKS {
         let audit = match SetAudit::open(&path) {
             Ok(audit) => audit,
-            Err(_) if look + 1 < LOOKS && SetAudit::is_being_replaced(&path) => {
-                std::thread::sleep(PAUSE);
-                continue;
-            }
             Err(error) => {
                 path = named(&path).ok_or(error)?;
                 continue;

@@ -10,7 +10,7 @@ use super::super::schema::SharedArray;
 use super::super::sum::Sum;
 use super::layout::Part;
 use super::manifest::{Manifest, SEALED, Seal, SetPlan};
-use super::occupy::replaced;
+use super::occupy::{GLANCE, undisturbed};
 
 /// A set that is being checked, complete or not.
 pub struct SetAudit {
@@ -52,7 +52,10 @@ impl fmt::Display for Fault {
 impl SetAudit {
     /// Reads the manifest of the set in a folder.
     pub fn open(path: impl AsRef<Path>) -> Result<SetAudit, OutputError> {
-        let path = path.as_ref();
+        undisturbed(path.as_ref(), GLANCE, || SetAudit::read(path.as_ref()))
+    }
+
+    fn read(path: &Path) -> Result<SetAudit, OutputError> {
         let not_a_set = || OutputError::NotASet { path: path.to_owned() };
         if !path.is_dir() {
             return Err(not_a_set());
@@ -64,11 +67,6 @@ impl SetAudit {
             false => Manifest::joined(path)?.ok_or_else(not_a_set)?,
         };
         Ok(SetAudit { root: path.to_owned(), manifest, is_complete, seal })
-    }
-
-    /// Whether there is no set under a name because another process is just replacing it.
-    pub fn is_being_replaced(path: &Path) -> bool {
-        !path.exists() && replaced(path).exists()
     }
 
     /// Whether the set has its name, and so has to be complete.

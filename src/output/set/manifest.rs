@@ -7,14 +7,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::ops::Range;
-#[cfg(unix)]
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::super::lock::identity;
 use super::super::pending::ignore_missing;
 use super::super::sum::{LARGEST, Sum, is_signed, signed};
 use super::super::{ByteCount, OutputError, Schema, partial};
@@ -190,11 +189,7 @@ impl Manifest {
     /// Identity of the complete set in a folder; `None` where none is.
     pub(super) fn seal(root: &Path) -> Option<Seal> {
         let found = fs::metadata(root.join(SEALED)).ok()?;
-        #[cfg(unix)]
-        let file = (found.dev(), found.ino());
-        #[cfg(not(unix))]
-        let file = (0, 0);
-        Some(Seal { file, modified: found.modified().ok() })
+        Some(Seal { file: identity(&found), modified: found.modified().ok() })
     }
 
     /// Joins the manifests of a set that is not sealed; `None` where there are none.

@@ -24,7 +24,7 @@ pub(super) const LOCK: &str = "_lock";
 pub(super) const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Time in which others only look whether somebody holds a lock.
-const GLANCE: Duration = Duration::from_secs(1);
+pub(super) const GLANCE: Duration = Duration::from_secs(1);
 
 /// Time after which a file server forgets the locks of a machine that is gone, and more.
 const LEASE: Duration = Duration::from_secs(120);
@@ -51,24 +51,33 @@ pub(super) fn occupy(
 ) -> Result<Option<Begun>, OutputError> {
     let begun = Instant::now();
     loop {
-        let seal = Manifest::seal(path);
-        match is_done(path, plan, start) {
-            // Another process replaced the set while it was read.
-            Err(_) if Manifest::seal(path) != seal && begun.elapsed() < PATIENCE => {
-                std::thread::sleep(PAUSE);
-                continue;
-            }
-            done => {
-                if done? {
-                    return Ok(None);
-                }
-            }
+        if undisturbed(path, PATIENCE, || is_done(path, plan, start))? {
+            return Ok(None);
         }
         if let Some(begun) = begin(path, shard, start)? {
             return Ok(Some(begun));
         }
         if begun.elapsed() > PATIENCE {
             return Err(busy(&partial(path)));
+        }
+        std::thread::sleep(PAUSE);
+    }
+}
+
+/// Reads a set that another process may replace meanwhile: once more, for some time, where that failed and one did.
+pub(super) fn undisturbed<T>(
+    path: &Path,
+    time: Duration,
+    read: impl Fn() -> Result<T, OutputError>,
+) -> Result<T, OutputError> {
+    let begun = Instant::now();
+    loop {
+        let seal = Manifest::seal(path);
+        let found = read();
+        let is_between = || !path.exists() && replaced(path).exists();
+        let is_disturbed = || Manifest::seal(path) != seal || is_between();
+        if found.is_ok() || begun.elapsed() > time || !is_disturbed() {
+            return found;
         }
         std::thread::sleep(PAUSE);
     }

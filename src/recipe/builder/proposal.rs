@@ -12,6 +12,7 @@ use crate::recipe::{CoverSize, Lrv, ProposalKind, Recipe, RecipeError, ResponseT
 pub(in crate::recipe) const OWN_TARGETS: &str = "bounds on what is scaled to a target of each draw's own";
 
 impl RecipeBuilder {
+    /// The recipe of a program, with the proposal that suits it.
     pub(super) fn with_proposal(self, program: Program) -> Result<Recipe, RecipeError> {
         if program.given > 0 {
             return self.given_its_own(program);

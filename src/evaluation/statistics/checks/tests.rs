@@ -25,10 +25,7 @@ fn thresholds_spend_the_budget() {
 #[test]
 fn covariances_are_those_of_the_formula() {
     let scenario = Scenario::named("untruncated");
-    let sample = |a: &[f64], b: &[f64]| Sample {
-        weights: vec![a.to_vec(), b.to_vec()],
-        ..oracle(&scenario, 1, a.len() as u64)
-    };
+    let sample = |a: &[f64], b: &[f64]| sample(&scenario, &[a, b], &[], &[1.0; 3]);
     let (one, other) = (sample(&[1.0, 2.0, 6.0], &[2.0, 0.0, 1.0]), sample(&[1.0; 3], &[1.0, 2.0, 3.0]));
     // Deviations -2, -1, 3 and 1, -1, 0: products -2, 1, 0 with the mean -1/3 and the variance 14/9. The other sample's
     // are 0.
